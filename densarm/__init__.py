@@ -1,0 +1,1 @@
+"""Collision-free motion of robot arms by navigation density functions."""

@@ -1,0 +1,289 @@
+"""Arm: Pinocchio's model of a robot arm, its geometry, limits and named postures."""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+from hashlib import sha256
+from pathlib import Path
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import ArrayLike, NDArray
+
+from densarm.arrays import Array
+from densarm.catalogue import robot_names, robot_description
+from densarm.errors import FileContentError, InvalidValueError, UnknownNameError
+from densarm.robot_description import RobotDescription, read_text
+from densarm.robot_models import build_models, build_visual_model
+from densarm.self_collision import srdf_postures
+from densarm.validation import finite_vector
+
+DEFAULT_ACCELERATION = 10.0
+"""Acceleration limit where nothing is known [rad/s² or m/s²]; a URDF carries none."""
+
+_UNLIMITED = 1e12  # URDFs write huge numbers where a joint has no limit
+
+
+@dataclass(frozen=True)
+class JointLimits:
+    """Limits of the joints, each of shape (nv,); infinite where a joint has none."""
+
+    lower: Array
+    """Lower position limit [rad or m]; minus infinity on continuous joints."""
+    upper: Array
+    """Upper position limit [rad or m]; infinity on continuous joints."""
+    velocity: Array
+    """Velocity limit [rad/s or m/s]."""
+    acceleration: Array
+    """Acceleration limit [rad/s² or m/s²]."""
+    effort: Array
+    """Torque or force limit [N·m or N]."""
+
+
+class Arm:
+    """A robot arm: a chain or tree of revolute, continuous and prismatic joints.
+
+    Args:
+        description: URDF, SRDF and what else the models are built from.
+
+    Raises:
+        RobotDescriptionError: the description cannot be used, with the reason.
+    """
+
+    def __init__(self, description: RobotDescription) -> None:
+        self.description = description
+        self.name = description.name
+        self.model, self.collision_model, self._mesh_files = build_models(description)
+        self.data = self.model.createData()
+        self.nq: int = self.model.nq
+        self.nv: int = self.model.nv
+        joints = list(self.model.joints)[1:]
+        self.joint_names: tuple[str, ...] = tuple(self.model.names)[1:]
+        self.idx_q: NDArray[np.int64] = np.array([joint.idx_q for joint in joints])
+        self.is_circle: NDArray[np.bool_] = np.array([joint.nq == 2 for joint in joints])
+        self.limits = self._limits()
+        self.end_effector = self._end_effector()
+        self.postures: dict[str, Array] = self._postures()
+
+    @cached_property
+    def visual_model(self) -> pin.GeometryModel:
+        """Pinocchio's visual geometry, loaded when first asked for."""
+        return build_visual_model(self.description)
+
+    def mesh_hashes(self) -> dict[str, str]:
+        """Return the SHA-256 of each collision mesh file, by file name."""
+        return {file.name: sha256(file.read_bytes()).hexdigest() for file in self._mesh_files}
+
+    def configuration(self, angles: ArrayLike) -> Array:
+        """Return the configuration q of joint positions.
+
+        Args:
+            angles: (nv,) one number per joint [rad or m].
+
+        Returns:
+            q (nq,): a continuous joint takes (cos, sin), any other its number.
+
+        Raises:
+            InvalidValueError: a wrong length, or an entry that is not finite.
+        """
+        return self.configurations(finite_vector("angles", angles, self.nv))
+
+    def configurations(self, angles: Array) -> Array:
+        """Return the configurations (..., nq) of joint positions (..., nv), without checks."""
+        q = np.zeros((*angles.shape[:-1], self.nq))
+        circle = self.is_circle
+        q[..., self.idx_q] = np.where(circle, np.cos(angles), angles)
+        q[..., self.idx_q[circle] + 1] = np.sin(angles[..., circle])
+        return q
+
+    def angles(self, q: ArrayLike) -> Array:
+        """Return joint positions (..., nv) of configurations q (..., nq) [rad or m].
+
+        A continuous joint's angle lies in (-pi, pi].
+        """
+        q = np.asarray(q, dtype=np.float64)
+        theta = q[..., self.idx_q]
+        circle = self.idx_q[self.is_circle]
+        theta[..., self.is_circle] = np.arctan2(q[..., circle + 1], q[..., circle])
+        return theta
+
+    def check_configuration(self, name: str, q: ArrayLike) -> Array:
+        """Return q as a float array (nq,).
+
+        Args:
+            name: how errors call it.
+            q: a configuration.
+
+        Raises:
+            InvalidValueError: a wrong length, an entry that is not finite, or a (cos, sin) pair
+                of a continuous joint that is not of length one.
+        """
+        hint = f" (from one number per joint: arm.configuration(angles))" if self.nq != self.nv else ""
+        vector = finite_vector(name, q, self.nq, hint)
+        for joint in np.flatnonzero(self.is_circle):
+            pair = vector[self.idx_q[joint] : self.idx_q[joint] + 2]
+            if abs(np.hypot(*pair) - 1.0) > 1e-6:
+                raise InvalidValueError(
+                    f"{name} of joint {self.joint_names[joint]!r}", pair.tolist(), "(cos, sin)"
+                )
+        return vector
+
+    def difference(self, q_from: Array, q_to: Array) -> Array:
+        """Return the tangent vector (..., nv) that leads from one configuration to another.
+
+        Args:
+            q_from: (..., nq).
+            q_to: (..., nq).
+
+        Returns:
+            q_to ⊖ q_from [rad or m]; the short way round on continuous joints.
+        """
+        delta = self.angles(q_to) - self.angles(q_from)
+        circle = self.is_circle
+        delta[..., circle] = np.arctan2(np.sin(delta[..., circle]), np.cos(delta[..., circle]))
+        return delta
+
+    def integrate(self, q: Array, step: Array) -> Array:
+        """Return q ⊕ step: the configurations (..., nq) that tangent vectors lead to.
+
+        Args:
+            q: (..., nq).
+            step: (..., nv) [rad or m].
+        """
+        return self.configurations(self.angles(q) + step)
+
+    def mass_matrix(self, q: ArrayLike) -> Array:
+        """Return the joint-space inertia matrix M(q).
+
+        Args:
+            q: (nq,).
+
+        Returns:
+            M (nv, nv), symmetric [kg·m² for revolute joints].
+        """
+        q = self.check_configuration("configuration", q)
+        upper = np.triu(pin.crba(self.model, self.data, q))
+        return np.asarray(upper + np.triu(upper, 1).T)
+
+    def nonlinear_effects(self, q: ArrayLike, v: ArrayLike) -> Array:
+        """Return H(q, v), the Coriolis, centrifugal and gravity torques.
+
+        Args:
+            q: (nq,).
+            v: (nv,) [rad/s or m/s].
+
+        Returns:
+            H (nv,) [N·m or N], so that M(q) a + H(q, v) = tau.
+        """
+        q = self.check_configuration("configuration", q)
+        v = finite_vector("velocity", v, self.nv)
+        return np.array(pin.nonLinearEffects(self.model, self.data, q, v))
+
+    def _limits(self) -> JointLimits:
+        model, bounded = self.model, ~self.is_circle
+        lower, upper = np.full(self.nv, -np.inf), np.full(self.nv, np.inf)
+        lower[bounded] = model.lowerPositionLimit[self.idx_q[bounded]]
+        upper[bounded] = model.upperPositionLimit[self.idx_q[bounded]]
+        given = self.description.acceleration
+        acceleration = (
+            np.full(self.nv, DEFAULT_ACCELERATION)
+            if given is None
+            else finite_vector("acceleration", given, self.nv)
+        )
+        return JointLimits(
+            lower=lower,
+            upper=upper,
+            velocity=_limit_or_infinity(model.upperVelocityLimit),
+            acceleration=acceleration,
+            effort=_limit_or_infinity(model.upperEffortLimit),
+        )
+
+    def _end_effector(self) -> str:
+        names = [frame.name for frame in self.model.frames]
+        name = self.description.end_effector
+        if name is None:
+            return str(names[-1])
+        if name not in names:
+            raise UnknownNameError("end-effector frame", name, names)
+        return name
+
+    def _postures(self) -> dict[str, Array]:
+        postures = {"neutral": self.configuration(np.clip(0.0, self.limits.lower, self.limits.upper))}
+        for name, positions in srdf_postures(self.description.srdf).items():
+            if set(self.joint_names) <= set(positions):
+                postures[name] = self.configuration([positions[j] for j in self.joint_names])
+        for name, angles in self.description.postures.items():
+            postures[name] = self.configuration(angles)
+        return postures
+
+
+def load_arm(
+    robot: str | Path,
+    *,
+    srdf: str | Path | None = None,
+    package_dirs: Iterable[str | Path] = (),
+    locked_joints: Mapping[str, float] | None = None,
+    base_placement: pin.SE3 | None = None,
+    shapes: str = "hull",
+) -> Arm:
+    """Load an arm by name or from a URDF file.
+
+    Args:
+        robot: a known name (``densarm list``), or the path of a URDF.
+        srdf: path of an SRDF, for disabled pairs and postures.
+        package_dirs: folders that ``package://`` paths of meshes start from; the URDF's own
+            folder and those above it are searched too.
+        locked_joints: exact URDF joint name to position [rad or m], which may lie outside limits.
+        base_placement: pose of the base in the world; gravity and obstacles stay.
+        shapes: "hull" for the collision geometry as it is, or "capsule" for the capsules that
+            a named arm comes with.
+
+    Raises:
+        UnknownNameError: no such robot, joint to lock, or link of the SRDF.
+        FileContentError: a file that cannot be read.
+        RobotDescriptionError: a URDF or SRDF that cannot be used.
+    """
+    path = Path(robot)
+    if str(robot) in robot_names():
+        description = robot_description(str(robot), shapes)
+    elif path.suffix in {".urdf", ".xml", ".xacro"} or path.is_file():
+        description = _description_of_file(path)
+    else:
+        raise UnknownNameError("robot", robot, [*robot_names(), "the path of a .urdf file"])
+    return Arm(_with_options(description, srdf, package_dirs, locked_joints, base_placement))
+
+
+def _description_of_file(path: Path) -> RobotDescription:
+    folder = path.resolve().parent
+    nearby = [folder, *folder.parents[:3]]
+    return RobotDescription(
+        name=path.stem, urdf=read_text(path), package_dirs=tuple(str(p) for p in nearby)
+    )
+
+
+def _with_options(
+    description: RobotDescription,
+    srdf: str | Path | None,
+    package_dirs: Iterable[str | Path],
+    locked_joints: Mapping[str, float] | None,
+    base_placement: pin.SE3 | None,
+) -> RobotDescription:
+    if isinstance(package_dirs, str | Path):
+        package_dirs = [package_dirs]
+    folders = tuple(str(Path(folder).resolve()) for folder in package_dirs)
+    return replace(
+        description,
+        srdf=description.srdf if srdf is None else read_text(Path(srdf)),
+        package_dirs=folders + description.package_dirs,
+        locked_joints={**description.locked_joints, **(locked_joints or {})},
+        base_placement=(
+            description.base_placement
+            if base_placement is None
+            else tuple(pin.SE3ToXYZQUAT(base_placement).tolist())
+        ),
+    )
+
+
+def _limit_or_infinity(limit: Array) -> Array:
+    limit = np.array(limit, dtype=np.float64)
+    return np.where((limit <= 0.0) | (limit >= _UNLIMITED), np.inf, limit)

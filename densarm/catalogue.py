@@ -1,0 +1,71 @@
+"""The catalogue of named robots and scenarios: the folder ``robots/``."""
+
+import tomllib
+from pathlib import Path
+from typing import Any
+
+from densarm.errors import FileContentError, RobotDescriptionError, UnknownNameError
+from densarm.robot_description import DATA_WHEEL, RobotDescription, read_text, resolve_path
+
+
+def robots_folder() -> Path:
+    """Return the folder of robots: inside the installed package, or beside a checkout's."""
+    package = Path(__file__).resolve().parent
+    inside = package / "robots"
+    return inside if inside.is_dir() else package.parent / "robots"
+
+
+def robot_names() -> list[str]:
+    """Return the names that `load_arm` knows."""
+    return sorted(path.parent.name for path in robots_folder().glob("*/arm.toml"))
+
+
+def scenario_paths() -> dict[str, Path]:
+    """Return the scenarios that `load_scenario` knows: name to TOML file."""
+    return {path.stem: path for path in sorted(robots_folder().glob("*/scenarios/*.toml"))}
+
+
+def robot_description(name: str, shapes: str = "hull") -> RobotDescription:
+    """Return the description of a named robot.
+
+    Args:
+        name: one of `robot_names`.
+        shapes: "hull" or "capsule".
+
+    Raises:
+        UnknownNameError: no such robot, or no such shapes.
+        RobotDescriptionError: the robot comes without capsules.
+    """
+    if name not in robot_names():
+        raise UnknownNameError("robot", name, robot_names())
+    if shapes not in ("hull", "capsule"):
+        raise UnknownNameError("shapes", shapes, ["hull", "capsule"])
+    folder = robots_folder() / name
+    entry = read_toml(folder / "arm.toml")
+    key = "urdf" if shapes == "hull" else "capsules"
+    if key not in entry:
+        raise RobotDescriptionError(f"robot {name!r} comes without capsules: use shapes 'hull'")
+    srdf = entry.get("srdf")
+    acceleration = entry.get("acceleration")
+    return RobotDescription(
+        name=name,
+        urdf=read_text(resolve_path(entry[key], folder)),
+        srdf=None if srdf is None else read_text(resolve_path(srdf, folder)),
+        package_dirs=(DATA_WHEEL,) if DATA_WHEEL in entry[key] else (str(folder),),
+        locked_joints=entry.get("locked_joints", {}),
+        acceleration=None if acceleration is None else tuple(acceleration),
+        end_effector=entry.get("end_effector"),
+        postures={key: tuple(value) for key, value in entry.get("postures", {}).items()},
+    )
+
+
+def read_toml(path: Path) -> dict[str, Any]:
+    """Return the content of a TOML file.
+
+    Raises:
+        FileContentError: it cannot be read, or is not TOML, with the line.
+    """
+    try:
+        return tomllib.loads(read_text(path))
+    except tomllib.TOMLDecodeError as error:
+        raise FileContentError(path, f"not TOML: {error}") from None

@@ -1,0 +1,46 @@
+"""DensityRegulation: the density inverse-dynamics controller towards a constant goal."""
+
+from numpy.typing import ArrayLike
+
+from densarm.arm import Arm
+from densarm.arrays import Array
+from densarm.control.controller import checked_state
+from densarm.control.gains import Gains
+from densarm.control.inverse_dynamics import InverseDynamics
+from densarm.fields.density_field import DensityField
+
+
+class DensityRegulation:
+    r"""Regulate to the goal by way of the sub-goals, without a reference in time.
+
+    .. math:: \tau = H + M K_v (k(q) - \dot q), \qquad k = \frac{K_p}{K_v} \nabla\rho
+        \text{ at the speed of the speed law}
+
+    which is [ZNV] eq. 17 with a constant q_d, its attraction scaled before its damping. Where the
+    full brake would leave the free space ahead, the arm brakes in a straight line.
+
+    Args:
+        arm: the arm.
+        field: the planning system k(q).
+        gains: K_v is used.
+        period: time between two calls [s].
+
+    Source: [ZNV] eq. 17.
+    """
+
+    def __init__(self, arm: Arm, field: DensityField, gains: Gains, period: float) -> None:
+        self._arm = arm
+        self._field = field
+        self._gain = gains.velocity
+        self._period = period
+        self._dynamics = InverseDynamics(arm)
+
+    def torque(self, t: float, q: ArrayLike, v: ArrayLike) -> Array:
+        """Act as `Controller.torque`."""
+        q, v = checked_state(self._arm, q, v)
+        attract = self._gain * self._field.update(q)
+        self._dynamics.update(q, v)
+        distance = self._field.guided.clearance.distance
+        if self._field.speed_law.must_brake(v, distance, 2.0 * self._period):
+            attract[:] = 0.0
+        return self._dynamics.torque(-self._gain * v, attract)

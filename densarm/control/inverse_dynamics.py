@@ -1,0 +1,100 @@
+"""InverseDynamics: torque for wanted accelerations, within the limits of the arm."""
+
+import numpy as np
+import pinocchio as pin
+
+from densarm.arm import Arm
+from densarm.arrays import Array
+from densarm.compiled import compiled
+
+
+class InverseDynamics:
+    r"""Turns a braking and an attracting part into torque, so that saturation spares braking.
+
+    .. math:: \tau = H(q, \dot q) + M(q) (\gamma\, a_{brake} + \beta\, a_{attract})
+
+    β in [0, 1] is the largest for which acceleration and torque limits hold with γ = 1; where
+    there is none, β = 0 and γ is the largest that holds them, which leaves a brake straight.
+
+    Args:
+        arm: its dynamics and limits.
+
+    Source: [ZNV] eq. 16-17; saturation [ZNV] eq. 13-14, applied to the attraction alone.
+    """
+
+    def __init__(self, arm: Arm) -> None:
+        self._model = arm.model
+        self._data = arm.model.createData()
+        self._mass = self._data.M
+        self._nonlinear = self._data.nle
+        self._limits = arm.limits
+
+    def update(self, q: Array, v: Array) -> None:
+        """Compute M and H at the state, q (nq,) and v (nv,)."""
+        pin.crba(self._model, self._data, q)
+        pin.nonLinearEffects(self._model, self._data, q, v)
+
+    def mass_matrix(self) -> Array:
+        """Return M (nv, nv) at the updated state."""
+        upper = np.triu(self._mass)
+        return np.asarray(upper + np.triu(upper, 1).T)
+
+    def torque(self, brake: Array, attract: Array) -> Array:
+        """Return torque (nv,) for accelerations (nv,) [rad/s²] at the updated state."""
+        return _limited_torque(
+            self._mass,
+            self._nonlinear,
+            brake,
+            attract,
+            self._limits.acceleration,
+            self._limits.effort,
+        )
+
+
+@compiled
+def _shares(
+    offset: Array, brake: Array, attract: Array, limit: Array
+) -> tuple[float, float]:
+    """Return (γ, β) that keep |offset + γ brake + β attract| ≤ limit, as the class says."""
+    low, high = 0.0, 1.0
+    for i in range(limit.shape[0]):
+        base = offset[i] + brake[i]
+        if attract[i] != 0.0:
+            a = (-limit[i] - base) / attract[i]
+            b = (limit[i] - base) / attract[i]
+            low, high = max(low, min(a, b)), min(high, max(a, b))
+        elif abs(base) > limit[i]:
+            high = -1.0
+    if low <= high:
+        return 1.0, high
+    share = 1.0
+    for i in range(limit.shape[0]):
+        if brake[i] != 0.0:
+            bound = limit[i] if brake[i] > 0.0 else -limit[i]
+            share = min(share, (bound - offset[i]) / brake[i])
+    return max(share, 0.0), 0.0
+
+
+@compiled
+def _limited_torque(
+    mass: Array,
+    nonlinear: Array,
+    brake: Array,
+    attract: Array,
+    acceleration_limit: Array,
+    effort_limit: Array,
+) -> Array:
+    nv = nonlinear.shape[0]
+    gamma, beta = _shares(np.zeros(nv), brake, attract, acceleration_limit)
+    brake_torque, attract_torque = np.zeros(nv), np.zeros(nv)
+    for i in range(nv):
+        for j in range(nv):
+            entry = mass[i, j] if i <= j else mass[j, i]  # crba fills the upper triangle
+            brake_torque[i] += entry * gamma * brake[j]
+            attract_torque[i] += entry * beta * attract[j]
+    gamma, beta = _shares(nonlinear, brake_torque, attract_torque, effort_limit)
+    tau = np.empty(nv)
+    for i in range(nv):
+        wanted = nonlinear[i] + gamma * brake_torque[i] + beta * attract_torque[i]
+        tau[i] = min(max(wanted, -effort_limit[i]), effort_limit[i])
+    return tau

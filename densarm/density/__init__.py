@@ -1,0 +1,39 @@
+"""Navigation densities: unsafe sets, goal distances and the field they make together."""
+
+from densarm.density.divergence import RantzerCondition, rantzer_condition
+from densarm.density.gauge import Gauge
+from densarm.density.goal_distance import (
+    EuclideanDistance,
+    GoalDistance,
+    ProductDistance,
+    TorusDistance,
+)
+from densarm.density.inverse_bump import inverse_bump
+from densarm.density.joint_error import joint_error
+from densarm.density.navigation_density import (
+    DensityParameters,
+    DensitySample,
+    NavigationDensity,
+)
+from densarm.density.smooth_step import smooth_step
+from densarm.density.unsafe_set import ClearanceSet, ImplicitSet, JointLimitSet, UnsafeSet
+
+__all__ = [
+    "ClearanceSet",
+    "DensityParameters",
+    "DensitySample",
+    "EuclideanDistance",
+    "Gauge",
+    "GoalDistance",
+    "ImplicitSet",
+    "JointLimitSet",
+    "NavigationDensity",
+    "ProductDistance",
+    "RantzerCondition",
+    "TorusDistance",
+    "UnsafeSet",
+    "inverse_bump",
+    "joint_error",
+    "rantzer_condition",
+    "smooth_step",
+]

@@ -1,0 +1,101 @@
+"""GuidedDensity: the navigation density towards the current sub-goal of a chain."""
+
+import numpy as np
+
+from densarm.arrays import Array
+from densarm.clearance import Clearance
+from densarm.density import (
+    ClearanceSet,
+    DensityParameters,
+    Gauge,
+    JointLimitSet,
+    NavigationDensity,
+    TorusDistance,
+)
+from densarm.fields.sub_goal_chain import SubGoalChain
+
+CRITICAL_SLOPE = 1e-9
+"""‖∇ ln ρ‖ [1/rad] at and below which a point counts as critical."""
+
+
+class GuidedDensity:
+    """The density whose goal is the current sub-goal, and whose sensing regions fit the way to it.
+
+    Args:
+        clearance: distances to the obstacles and of the arm to itself.
+        chain: the sub-goals.
+        margin: safety margin m of the unsafe sets [m].
+        parameters: of the density.
+        kappa: of the goal distance.
+        weights: of the goal distance, one per joint (nv,) [rad⁻² or m⁻²]; None for ones.
+
+    Source: [ZNV] Remark 1, which lets the goal distance adapt to the space.
+    """
+
+    def __init__(
+        self,
+        clearance: Clearance,
+        chain: SubGoalChain,
+        margin: float,
+        parameters: DensityParameters,
+        kappa: float,
+        weights: Array | None = None,
+    ) -> None:
+        arm = clearance.arm
+        self.chain = chain
+        self.clearance = clearance
+        self._margin = margin
+        self._log_gradient = np.zeros(arm.nv)
+        self._clearance_set = ClearanceSet(clearance, margin, chain.sensing_distance[1])
+        self.goal_distance = TorusDistance(arm, chain.q[1], weights, kappa)
+        self.density = NavigationDensity(
+            [self._clearance_set, JointLimitSet(arm, chain.joint_sensing_distance)],
+            self.goal_distance,
+            parameters,
+        )
+        self._point_at_sub_goal()
+
+    def restart(self) -> None:
+        """Return to the first sub-goal."""
+        self.chain.current = 1
+        self._point_at_sub_goal()
+
+    def advance(self, q: Array) -> bool:
+        """Move on along the chain, from the distances of the density's last update at q (nq,).
+
+        Returns:
+            Whether the sub-goal changed.
+        """
+        changed = self.chain.advance(q, self.clearance.distance)
+        if changed:
+            self._point_at_sub_goal()
+        return changed
+
+    def write_gradient(self, out: Array) -> None:
+        """Write ∇ρ (nv,) of the last update in the density's own gauge into `out`."""
+        self.density.write_gradient(self.density.parameters.gauge, out)
+
+    def slope(self) -> float:
+        """Return ‖∇ ln ρ‖ at the last update [1/rad]."""
+        self.density.write_gradient(Gauge.LOG, self._log_gradient)
+        return float(np.sqrt(self._log_gradient @ self._log_gradient))
+
+    def is_critical(self) -> bool:
+        """Return whether the last update was at a critical point of ρ, the sub-goal included."""
+        return not self.slope() > CRITICAL_SLOPE
+
+    def way_left(self, q: Array) -> float:
+        """Return the length of the way from q (nq,) by the sub-goals to the goal [rad]."""
+        to_sub_goal = float(np.linalg.norm(self.goal_distance.error(q)))
+        return to_sub_goal + float(self.chain.remaining[self.chain.current])
+
+    def blocking_pairs(self) -> list[tuple[str, str]]:
+        """Return the pairs inside their sensing regions at the last update, nearest first."""
+        distance = self.clearance.distance
+        sensed = np.flatnonzero(distance - self._margin < self._clearance_set.sensing_distance)
+        return [self.clearance.pairs[k] for k in sensed[np.argsort(distance[sensed])]]
+
+    def _point_at_sub_goal(self) -> None:
+        current = self.chain.current
+        self.goal_distance.set_goal(self.chain.q[current])
+        self._clearance_set.sensing_distance[:] = self.chain.sensing_distance[current]

@@ -1,0 +1,112 @@
+"""PlanningSystem: the integral curve of the guided density, from start to goal."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from densarm.arrays import Array
+from densarm.density import Gauge
+from densarm.fields.guided_density import GuidedDensity
+from densarm.swept_bound import SweptBound
+
+
+@dataclass(frozen=True)
+class PlannedCurve:
+    """What the planning system did."""
+
+    q: Array
+    """Points of the curve (N, nq), N >= 1, from the start."""
+    reached: bool
+    """Whether the last point is the goal; else it is where the curve got stuck."""
+    detail: str
+    """Where it got stuck and what blocks it; empty when reached."""
+
+
+class PlanningSystem:
+    """Integrates the direction of q̇ = ∇ρ(q) as a curve without time.
+
+    Every step goes up the density: it is halved until ρ has grown, and no step is longer than
+    a share of the clearance ahead, so that none jumps through an obstacle. A curve that can no
+    longer climb has met a critical point of ρ.
+
+    Args:
+        guided: the density and its sub-goals.
+        bound: the bound on how far a step moves the bodies.
+
+    Source: [ZNV] eq. 11, section V-C.
+    """
+
+    STEP = 0.05
+    """Longest step [rad]."""
+    CLEARANCE_SHARE = 0.3
+    """Share of a pair's clearance that one step may use up."""
+    SMALLEST_STEP = 1e-7
+    """A step below this length [rad] makes no progress."""
+    MAX_STEPS = 20_000
+
+    def __init__(self, guided: GuidedDensity, bound: SweptBound) -> None:
+        self._guided = guided
+        self._density = guided.density
+        self._bound = bound
+        self._arm = bound.arm
+        self._gradient = np.zeros(self._arm.nv)
+
+    def integrate(self, start: Array) -> PlannedCurve:
+        """Return the curve from a collision-free start (nq,)."""
+        guided, arm = self._guided, self._arm
+        guided.restart()
+        goal, points = guided.chain.q[-1], [start]
+        q = start
+        self._density.update(q)
+        for _ in range(self.MAX_STEPS):
+            if guided.advance(q):
+                self._density.update(q)
+            error = guided.goal_distance.error(q)
+            if guided.chain.is_last and np.abs(error).max() <= self.SMALLEST_STEP:
+                return PlannedCurve(np.array([*points[:-1], goal]), reached=True, detail="")
+            q_next = self._climb(q, float(np.linalg.norm(error)))
+            if q_next is None:
+                return self._stuck(points)
+            q = q_next
+            points.append(q)
+        return self._stuck(points)
+
+    def _climb(self, q: Array, distance_left: float) -> Array | None:
+        """Return the next point, with the density updated there, or None where ρ has no slope."""
+        if self._guided.is_critical():
+            return None
+        self._density.write_gradient(Gauge.LOG, self._gradient)
+        direction = self._gradient / np.linalg.norm(self._gradient)
+        before = self._log_density()
+        length = min(self.STEP, distance_left, self._clear_length(direction))
+        while length > self.SMALLEST_STEP:
+            candidate = self._arm.integrate(q, length * direction)
+            self._density.update(candidate)
+            if self._log_density() > before:
+                return candidate
+            length *= 0.5
+        self._density.update(q)
+        return None
+
+    def _clear_length(self, direction: Array) -> float:
+        room = self._guided.clearance.distance - self._bound.margin
+        rate = self._bound.motion(direction)
+        moving = rate > 0.0
+        return float((self.CLEARANCE_SHARE * room[moving] / rate[moving]).min(initial=np.inf))
+
+    def _log_density(self) -> float:
+        density = self._density
+        log_distance = np.log(max(density.goal_distance_value, 1e-300))
+        return float(density.log_psi - density.parameters.alpha * log_distance)
+
+    def _stuck(self, points: list[Array]) -> PlannedCurve:
+        q = points[-1]
+        self._density.update(q)
+        blocking = [" and ".join(pair) for pair in self._guided.blocking_pairs()[:5]]
+        where = ", ".join(f"{angle:.4g}" for angle in self._arm.angles(q))
+        kind = "critical point of" if self._guided.is_critical() else "no ascent along"
+        detail = (
+            f"{kind} the density at joint positions ({where}), where |grad ln rho| = "
+            f"{self._guided.slope():.2g}; sensed there: {', '.join(blocking) or 'no pair'}"
+        )
+        return PlannedCurve(np.array(points), reached=False, detail=detail)

@@ -1,0 +1,137 @@
+"""SubGoalChain: the sub-goals of a guide, close enough to follow, each with its sensing distance."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from densarm.arrays import Array
+from densarm.compiled import compiled
+from densarm.errors import InvalidValueError
+from densarm.guides.guide import GuidePath
+from densarm.swept_bound import SweptBound
+from densarm.validation import positive
+
+_SURPLUS = 3.0
+"""Factor by which neighbours are closer than a proof needs, so that an arm near one sees the next."""
+
+
+@dataclass(frozen=True)
+class SensingParameters:
+    """How far from unsafe sets the density changes.
+
+    Raises:
+        InvalidValueError: a value out of its range.
+    """
+
+    distance: float = 0.05
+    """Largest sensing distance σ of a geometry pair [m]."""
+
+    path_share: float = 0.45
+    """σ is at most this share of the path's own clearance, below 1; from Ψ = 1 on the path."""
+
+    joint: float = 0.1
+    """Largest sensing distance of a joint limit [rad or m]."""
+
+    def __post_init__(self) -> None:
+        positive("sensing.distance", self.distance)
+        positive("sensing.joint", self.joint)
+        if not 0.0 < self.path_share < 1.0:
+            raise InvalidValueError("sensing.path_share", self.path_share, "between 0 and 1")
+
+
+class SubGoalChain:
+    """Sub-goals from start to goal and the one that is current.
+
+    A path is cut so finely that from each sub-goal the next is in sight: the bound proves the
+    segment between them clear, with at least half of an end's clearance left on all of it. The
+    sensing distance of a sub-goal stays below what is left, so that the density leads straight
+    along the path until something pushes the arm off it. A way that no guide proved keeps its
+    goal as the only sub-goal, with the full sensing distance: the plain density.
+
+    Args:
+        bound: proves what is in sight.
+        path: the guide's answer.
+        sensing: sensing distances.
+    """
+
+    SPACING = 0.05
+    """Largest distance of neighbouring sub-goals in any joint [rad or m]."""
+
+    def __init__(self, bound: SweptBound, path: GuidePath, sensing: SensingParameters) -> None:
+        arm = bound.arm
+        self._bound = bound
+        self.q = _refine(bound, path) if path.is_clear else path.waypoints
+        self.slack = np.array([bound.slack(q) for q in self.q])
+        """By how much each pair exceeds the margin at each sub-goal (W, K) [m]."""
+        steps = np.linalg.norm(arm.difference(self.q[:-1], self.q[1:]), axis=1)
+        self.remaining: Array = np.append(np.cumsum(steps[::-1])[::-1], 0.0)
+        """Length of the way from each sub-goal to the goal (W,) [rad]."""
+        self.sensing_distance = np.full_like(self.slack, sensing.distance)
+        """Sensing distance of each pair on the way to each sub-goal (W, K) [m]."""
+        self.joint_sensing_distance = np.full(arm.nv, sensing.joint)
+        """Sensing distance of each joint's limits (nv,) [rad or m]."""
+        if path.is_clear:
+            near = np.minimum(self.slack, np.minimum(_shifted(self.slack, 1), _shifted(self.slack, -1)))
+            np.minimum(sensing.path_share * near, sensing.distance, out=self.sensing_distance)
+            angles = arm.angles(self.q)
+            room = np.minimum(angles - arm.limits.lower, arm.limits.upper - angles).min(axis=0)
+            room = np.maximum(sensing.path_share * room, 1e-6)
+            np.minimum(room, sensing.joint, out=self.joint_sensing_distance)
+        self.current = 1
+        """Index of the current sub-goal."""
+
+    @property
+    def is_last(self) -> bool:
+        """Whether the current sub-goal is the goal."""
+        return self.current == len(self.q) - 1
+
+    def advance(self, q: Array, distance: Array) -> bool:
+        """Move on to the farthest consecutive sub-goal that is in sight.
+
+        Args:
+            q: configuration of the arm (nq,).
+            distance: distances of all pairs there (K,) [m].
+
+        Returns:
+            Whether the current sub-goal changed.
+        """
+        before = self.current
+        while not self.is_last and _in_sight(
+            self._bound.lever,
+            np.abs(self._bound.arm.difference(q, self.q[self.current + 1])),
+            distance,
+            self._bound.margin,
+            self.slack[self.current + 1],
+        ):
+            self.current += 1
+        return self.current != before
+
+
+def _refine(bound: SweptBound, path: GuidePath) -> Array:
+    arm, pieces = bound.arm, [path.waypoints[:1]]
+    for q_a, q_b in zip(path.waypoints[:-1], path.waypoints[1:], strict=True):
+        step = arm.difference(q_a, q_b)
+        cuts = bound.clear_subdivision(q_a, q_b, _SURPLUS)
+        if cuts is None:
+            raise InvalidValueError("path", [q_a.tolist(), q_b.tolist()], "proved clear")
+        even = np.linspace(0.0, 1.0, 1 + int(np.ceil(np.abs(step).max() / SubGoalChain.SPACING)))
+        fractions = np.union1d(cuts, even)[1:]
+        pieces.append(arm.integrate(q_a, fractions[:, np.newaxis] * step))
+    return np.vstack(pieces)
+
+
+def _shifted(rows: Array, by: int) -> Array:
+    """Return rows moved down by one, or up by -1, the end row standing twice."""
+    index = np.clip(np.arange(len(rows)) - by, 0, len(rows) - 1)
+    return rows[index]
+
+
+@compiled
+def _in_sight(lever: Array, step: Array, distance: Array, margin: float, slack: Array) -> bool:
+    for k in range(lever.shape[0]):
+        motion = 0.0
+        for j in range(lever.shape[1]):
+            motion += lever[k, j] * step[j]
+        if motion > max(distance[k] - margin, slack[k]):
+            return False
+    return True

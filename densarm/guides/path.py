@@ -1,0 +1,116 @@
+"""PathGuide: sub-goals along a collision-free path."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from densarm.arm import Arm
+from densarm.arrays import Array
+from densarm.errors import InvalidValueError
+from densarm.guides.guide import FreeSpace, GuidePath, NoPath
+from densarm.guides.shortcut import shortcut
+from densarm.validation import positive, positive_integer
+
+
+@dataclass(frozen=True)
+class PathGuideParameters:
+    """How long and how finely `PathGuide` searches; no clock decides anything."""
+
+    iterations: int = 10_000
+    """Samples that one search draws at most."""
+
+    searches: int = 2
+    """Searches from scratch, each with its own seed, before giving up."""
+
+    extension: float = 1.0
+    """Longest edge that a search adds to its trees [rad or m]."""
+
+    shortcuts: int = 100
+    """Shortcuts tried on a path that was found."""
+
+    def __post_init__(self) -> None:
+        positive_integer("iterations", self.iterations)
+        positive_integer("searches", self.searches)
+        positive("extension", self.extension)
+        positive_integer("shortcuts", self.shortcuts)
+
+
+class PathGuide:
+    """Search a path whose every segment is proved clear, and shorten it.
+
+    The straight segment comes first, being the shortest path; then RRT-Connect (Kuffner and
+    LaValle, ICRA 2000; by OMPL), then shortcuts between random points of the path found.
+
+    Args:
+        arm: the arm; every joint that is not continuous needs position limits.
+        freedom: the free space, which proves every edge.
+        parameters: see `PathGuideParameters`.
+
+    Raises:
+        InvalidValueError: a joint whose position limits leave no interval to search in.
+    """
+
+    def __init__(
+        self, arm: Arm, freedom: FreeSpace, parameters: PathGuideParameters | None = None
+    ) -> None:
+        self._arm = arm
+        self._freedom = freedom
+        self._parameters = parameters or PathGuideParameters()
+        _check_limits(arm)
+
+    def plan(self, start: Array, goal: Array, seed: int) -> GuidePath | NoPath:
+        """Return a chain of clear segments from a start to a goal, or why there is none.
+
+        Args:
+            start: (nq,) configuration.
+            goal: (nq,) configuration.
+            seed: whole number >= 0 that every random choice derives from.
+        """
+        for name, q in (("start", start), ("goal", goal)):
+            if fault := self._fault(q):
+                return NoPath(f"the {name} {fault}")
+        if self._freedom.segment_is_clear(start, goal):
+            return GuidePath(np.stack([start, goal]), is_clear=True)
+        return self._search(start, goal, np.random.default_rng(seed))
+
+    def _search(self, start: Array, goal: Array, rng: np.random.Generator) -> GuidePath | NoPath:
+        from densarm.guides.rrt_connect import rrt_connect
+
+        p = self._parameters
+        for _ in range(p.searches):
+            path = rrt_connect(
+                self._arm,
+                self._freedom,
+                start,
+                goal,
+                iterations=p.iterations,
+                extension=p.extension,
+                seed=int(rng.integers(1, 2**31)),
+            )
+            if path is not None:
+                return GuidePath(
+                    shortcut(self._arm, self._freedom, path, p.shortcuts, rng), is_clear=True
+                )
+        return NoPath(
+            f"the straight segment is not clear, and {p.searches} searches by RRT-Connect of "
+            f"{p.iterations} iterations each found no path"
+        )
+
+    def _fault(self, q: Array) -> str | None:
+        limits, angles = self._arm.limits, self._arm.angles(q)
+        outside = np.flatnonzero((angles < limits.lower) | (angles > limits.upper))
+        if outside.size:
+            names = ", ".join(self._arm.joint_names[joint] for joint in outside)
+            return f"is outside the position limits of {names}"
+        return None if self._freedom.configuration_is_clear(q) else "is not clear of contact"
+
+
+def _check_limits(arm: Arm) -> None:
+    lower, upper = arm.limits.lower, arm.limits.upper
+    width = upper - lower
+    for joint in np.flatnonzero(~arm.is_circle & ~((width > 0.0) & np.isfinite(width))):
+        raise InvalidValueError(
+            f"position limits of joint {arm.joint_names[joint]!r}",
+            (float(lower[joint]), float(upper[joint])),
+            "finite, lower < upper, for a path search (or lock the joint)",
+        )

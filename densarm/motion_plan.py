@@ -1,0 +1,98 @@
+"""MotionPlan: from a guide's sub-goals to the planning system's timed trajectory."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from densarm.arrays import Array
+from densarm.clearance import Clearance
+from densarm.fields.guided_density import GuidedDensity
+from densarm.fields.planning_system import PlannedCurve, PlanningSystem
+from densarm.fields.sub_goal_chain import SubGoalChain
+from densarm.guides.direct import DirectGuide
+from densarm.guides.guide import Guide, NoPath
+from densarm.guides.path import PathGuide
+from densarm.reference.reference import Reference
+from densarm.scenario import ControlForm, GuideKind, Scenario
+from densarm.swept_bound import SweptBound
+
+_END_SHARE = 0.5
+"""Share of the clearance at start and goal that a path's margin may take."""
+
+
+@dataclass(frozen=True)
+class MotionPlan:
+    """What the controllers need to know of the way."""
+
+    guided: GuidedDensity
+    """The density along the sub-goals."""
+    bound: SweptBound
+    """The swept bound under the scenario's margin."""
+    reference: Reference
+    """The timed trajectory of the planning system, to where it got."""
+    curve: PlannedCurve
+    """The planning system's curve."""
+
+
+def plan_motion(
+    scenario: Scenario, clearance: Clearance, guide: Guide | GuideKind, seed: int
+) -> MotionPlan | NoPath:
+    """Plan a motion: sub-goals, integral curve, smooth path, timing.
+
+    Args:
+        scenario: start, goal and parameters.
+        clearance: of the scenario's arm and scene.
+        guide: supplies the sub-goals.
+        seed: of the guide's random choices.
+
+    Raises:
+        InfeasibleTimingError: the limits allow no motion along the path.
+    """
+    arm, control = scenario.arm, scenario.control
+    start, goal = scenario.start_configuration, scenario.goal_configuration
+    bound = SweptBound(clearance, control.margin)
+    ends = min(bound.slack(q).min(initial=np.inf) for q in (start, goal))
+    room = min(control.path_margin, _END_SHARE * ends)
+    path_bound = bound.with_margin(control.margin + room)
+    if isinstance(guide, GuideKind):
+        guide = (
+            DirectGuide()
+            if guide == GuideKind.DIRECT
+            else PathGuide(arm, path_bound, scenario.planning)
+        )
+    path = guide.plan(start, goal, seed)
+    if isinstance(path, NoPath):
+        return path
+    chain = SubGoalChain(bound, path, scenario.sensing)
+    guided = GuidedDensity(
+        clearance, chain, control.margin, scenario.density, control.kappa, _weights(scenario)
+    )
+    curve = PlanningSystem(guided, bound).integrate(start)
+    guided.restart()
+    smooth_bound = bound.with_margin(control.margin + (0.5 * room if path.is_clear else 0.0))
+    reference = _reference(scenario, smooth_bound, curve.q)
+    if reference is None:
+        return NoPath("no smooth path near the planning system's curve is proved clear")
+    return MotionPlan(guided, bound, reference, curve)
+
+
+def _weights(scenario: Scenario) -> Array | None:
+    """Return weights of V: in proportion to inertia where the density is a torque, else none."""
+    if scenario.control.form != ControlForm.PLAIN:
+        return None
+    inertia = scenario.arm.mass_matrix(scenario.goal_configuration).diagonal()
+    return inertia / inertia.max()
+
+
+def _reference(scenario: Scenario, bound: SweptBound, curve: Array) -> Reference | None:
+    arm, period = scenario.arm, scenario.simulation.control_period
+    length = float(np.linalg.norm(arm.difference(curve[:-1], curve[1:]), axis=1).sum())
+    if length == 0.0:
+        rest = np.tile(arm.angles(curve[0]), (2, 1))
+        return Reference(period, rest, np.zeros_like(rest))
+    # SciPy and TOPP-RA take a second to import.
+    from densarm.reference.smooth_path import smooth_path
+    from densarm.reference.timing import time_path
+
+    path = smooth_path(bound, curve)
+    return None if path is None else time_path(arm, path, length, period, scenario.timing)

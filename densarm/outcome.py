@@ -1,0 +1,29 @@
+"""Outcome: how a run ended."""
+
+from enum import StrEnum
+
+
+class Outcome(StrEnum):
+    """How a run ended; equal to the word that JSON uses, with a sentence in `description`."""
+
+    REACHED = "reached"
+    STUCK = "stuck"
+    COLLIDED = "collided"
+    TIMED_OUT = "timed_out"
+    INFEASIBLE = "infeasible"
+    NO_PATH = "no_path"
+
+    @property
+    def description(self) -> str:
+        """One sentence on what the outcome means."""
+        return _DESCRIPTIONS[self]
+
+
+_DESCRIPTIONS = {
+    Outcome.REACHED: "The arm reached the goal, held it and touched nothing.",
+    Outcome.STUCK: "The arm came to rest away from the goal, where the density has no slope.",
+    Outcome.COLLIDED: "The arm touched an obstacle or itself.",
+    Outcome.TIMED_OUT: "The time limit ended the run before the goal was reached and held.",
+    Outcome.INFEASIBLE: "The start or the goal is in contact or outside the limits.",
+    Outcome.NO_PATH: "The guide found no collision-free path to the goal.",
+}

@@ -1,0 +1,279 @@
+"""Scenario: robot, scene, start, goal and parameters of one run, from TOML or JSON."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field, replace
+from enum import StrEnum
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+from densarm.arm import Arm, load_arm
+from densarm.arrays import Array
+from densarm.catalogue import read_toml, scenario_paths
+from densarm.control.gains import Gains
+from densarm.density import DensityParameters
+from densarm.errors import (
+    DensarmError,
+    FileContentError,
+    InvalidValueError,
+    RobotDescriptionError,
+    UnknownNameError,
+)
+from densarm.fields.speed_law import SpeedParameters
+from densarm.fields.sub_goal_chain import SensingParameters
+from densarm.guides.path import PathGuideParameters
+from densarm.reference.timing_parameters import TimingParameters
+from densarm.robot_description import RobotDescription
+from densarm.scene import Scene
+from densarm.simulation.fixed_step_loop import SimulationParameters
+from densarm.tables import parse_table
+from densarm.validation import finite_tuple, non_negative
+
+
+class GuideKind(StrEnum):
+    """Where the sub-goals come from."""
+
+    PATH = "path"
+    """A collision-free path by OMPL."""
+    DIRECT = "direct"
+    """The goal alone, as in [ZNV]."""
+
+
+class ControlForm(StrEnum):
+    """Which density controller drives the arm."""
+
+    TRACKING = "tracking"
+    """Along the timed trajectory of the planning system, [ZNV] eq. 17."""
+    REGULATION = "regulation"
+    """To the goal by way of the sub-goals, [ZNV] eq. 17 with constant q_d."""
+    PLAIN = "plain"
+    """u = ∇ρ + d(q, q̇)."""
+
+
+@dataclass(frozen=True)
+class ControlParameters:
+    """Which controller, and the guide it follows."""
+
+    form: ControlForm = ControlForm.TRACKING
+    """The controller."""
+    guide: GuideKind = GuideKind.PATH
+    """The guide, unless the caller names another."""
+    margin: float = 0.0
+    """Safety margin m: a pair is unsafe at this distance and below [m]."""
+    path_margin: float = 0.005
+    """Distance that paths keep beyond m where start and goal leave so much [m]."""
+    kappa: float = 1.0
+    """κ of the goal distance, between product and sum."""
+
+    def __post_init__(self) -> None:
+        non_negative("control.margin", self.margin)
+        non_negative("control.path_margin", self.path_margin)
+
+
+@dataclass(frozen=True)
+class Scenario:
+    """Everything that determines a run, but for the seed.
+
+    Raises:
+        InvalidValueError: start or goal is not one finite number per joint.
+    """
+
+    name: str
+    title: str
+    robot: RobotDescription
+    scene: Scene
+    start: tuple[float, ...]
+    """Joint positions at the start, one number per joint [rad or m]."""
+    goal: tuple[float, ...]
+    """Joint positions of the goal, one number per joint [rad or m]."""
+    control: ControlParameters = field(default_factory=ControlParameters)
+    density: DensityParameters = field(default_factory=DensityParameters)
+    sensing: SensingParameters = field(default_factory=SensingParameters)
+    planning: PathGuideParameters = field(default_factory=PathGuideParameters)
+    timing: TimingParameters = field(default_factory=TimingParameters)
+    speed: SpeedParameters = field(default_factory=SpeedParameters)
+    gains: Gains = field(default_factory=Gains)
+    simulation: SimulationParameters = field(default_factory=SimulationParameters)
+    seed: int = 0
+    """Seed of every random choice."""
+
+    def __post_init__(self) -> None:
+        for key in ("start", "goal"):
+            object.__setattr__(self, key, finite_tuple(key, getattr(self, key), self.arm.nv))
+
+    @cached_property
+    def arm(self) -> Arm:
+        """The arm, built when first asked for."""
+        return Arm(self.robot)
+
+    @property
+    def start_configuration(self) -> Array:
+        """The start as a configuration (nq,)."""
+        return self.arm.configuration(self.start)
+
+    @property
+    def goal_configuration(self) -> Array:
+        """The goal as a configuration (nq,)."""
+        return self.arm.configuration(self.goal)
+
+    def to_json(self) -> dict[str, Any]:
+        """Return JSON data that suffices to rebuild the scenario; `from_json` is its inverse."""
+        return {
+            "format": FORMAT,
+            "name": self.name,
+            "title": self.title,
+            "robot": self.robot.to_json(),
+            "mesh_sha256": self.arm.mesh_hashes(),
+            "obstacles": self.scene.to_json(),
+            "start": list(self.start),
+            "goal": list(self.goal),
+            "seed": self.seed,
+            **{key: asdict(getattr(self, key)) for key in TABLES},
+        }
+
+    @classmethod
+    def from_json(cls, data: Mapping[str, Any]) -> Scenario:
+        """Rebuild a scenario from the data of `to_json`.
+
+        Raises:
+            DensarmError: the data is not a scenario, or a mesh file has changed since.
+        """
+        if not isinstance(data, Mapping) or data.get("format") != FORMAT:
+            raise DensarmError(f"scenario: not of format {FORMAT}")
+        try:
+            scenario = cls(
+                name=data["name"],
+                title=data["title"],
+                robot=RobotDescription.from_json(data["robot"]),
+                scene=Scene.from_json(data["obstacles"]),
+                start=data["start"],
+                goal=data["goal"],
+                seed=data["seed"],
+                **{key: parse_table(key, kind, data[key]) for key, kind in TABLES.items()},
+            )
+            recorded = data["mesh_sha256"]
+        except KeyError as error:
+            raise DensarmError(f"scenario: the key {error} is missing") from None
+        if scenario.arm.mesh_hashes() != recorded:
+            raise RobotDescriptionError(
+                f"robot {scenario.robot.name!r}: its mesh files have changed since the recording"
+            )
+        return scenario
+
+
+FORMAT = 1
+"""Version of the JSON form."""
+
+TABLES: Mapping[str, type[Any]] = {
+    "control": ControlParameters,
+    "density": DensityParameters,
+    "sensing": SensingParameters,
+    "planning": PathGuideParameters,
+    "timing": TimingParameters,
+    "speed": SpeedParameters,
+    "gains": Gains,
+    "simulation": SimulationParameters,
+}
+"""The optional tables of a scenario file and what they hold."""
+
+_KEYS = {"title", "robot", "obstacles", "task", "seed", *TABLES}
+
+
+def load_scenario(scenario: str | Path) -> Scenario:
+    """Load a scenario by name or from a TOML file.
+
+    Args:
+        scenario: a known name (``densarm list``), or the path of a TOML file.
+
+    Raises:
+        UnknownNameError: no such scenario, robot, key or posture.
+        InvalidValueError: a value that is not allowed, with its key.
+        FileContentError: the file cannot be read, or is not TOML.
+    """
+    known = scenario_paths()
+    path = known.get(str(scenario), Path(scenario))
+    if str(scenario) not in known and path.suffix != ".toml" and not path.is_file():
+        raise UnknownNameError("scenario", scenario, [*known, "the path of a .toml file"])
+    data = read_toml(path)
+    try:
+        return _parse(path, data)
+    except FileContentError:
+        raise
+    except DensarmError as error:
+        raise FileContentError(path, str(error)) from None
+
+
+def _parse(path: Path, data: dict[str, Any]) -> Scenario:
+    for key in data:
+        if key not in _KEYS:
+            raise UnknownNameError("key", key, _KEYS)
+    arm = _parse_robot(path.parent, parse_table("robot", _RobotTable, data.get("robot", {})))
+    task = parse_table("task", _TaskTable, data.get("task", {}))
+    obstacles = data.get("obstacles", [])
+    if not isinstance(obstacles, list):
+        raise InvalidValueError("obstacles", obstacles, "a list of tables [[obstacles]]")
+    seed = data.get("seed", 0)
+    if not isinstance(seed, int) or isinstance(seed, bool) or seed < 0:
+        raise InvalidValueError("seed", seed, "an integer >= 0")
+    scenario = Scenario(
+        name=path.stem,
+        title=str(data.get("title", path.stem)),
+        robot=arm.description,
+        scene=Scene.from_json(obstacles),
+        start=_joint_positions(arm, "task.start", task.start),
+        goal=_joint_positions(arm, "task.goal", task.goal),
+        seed=seed,
+        **{key: parse_table(key, kind, data.get(key, {})) for key, kind in TABLES.items()},
+    )
+    scenario.__dict__["arm"] = arm
+    return scenario
+
+
+@dataclass(frozen=True)
+class _RobotTable:
+    name: str = ""
+    urdf: str = ""
+    srdf: str = ""
+    package_dirs: tuple[str, ...] = ()
+    locked_joints: dict[str, float] = field(default_factory=dict)
+    base_placement: tuple[float, float, float, float, float, float, float] | None = None
+    acceleration: tuple[float, ...] | None = None
+    shapes: str = "hull"
+
+
+@dataclass(frozen=True)
+class _TaskTable:
+    start: str | tuple[float, ...] = ()
+    goal: str | tuple[float, ...] = ()
+
+
+def _parse_robot(folder: Path, table: _RobotTable) -> Arm:
+    if bool(table.name) == bool(table.urdf):
+        raise InvalidValueError(
+            "robot", {"name": table.name, "urdf": table.urdf}, "a table with either name or urdf"
+        )
+    arm = load_arm(
+        table.name or folder / table.urdf,
+        srdf=folder / table.srdf if table.srdf else None,
+        package_dirs=[folder / item for item in table.package_dirs],
+        locked_joints=table.locked_joints,
+        shapes=table.shapes,
+    )
+    changes: dict[str, Any] = {}
+    if table.base_placement is not None:
+        changes["base_placement"] = table.base_placement
+    if table.acceleration is not None:
+        changes["acceleration"] = table.acceleration
+    return Arm(replace(arm.description, **changes)) if changes else arm
+
+
+def _joint_positions(
+    arm: Arm, key: str, value: str | tuple[float, ...]
+) -> tuple[float, ...]:
+    if isinstance(value, str):
+        if value not in arm.postures:
+            raise UnknownNameError(f"posture for {key}", value, arm.postures)
+        return tuple(arm.angles(arm.postures[value]).tolist())
+    return finite_tuple(f"{key} (one number per joint, or a posture)", value, arm.nv)

@@ -1,0 +1,236 @@
+"""Scene: the obstacles around an arm, as frozen values in the world frame."""
+
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import asdict, dataclass
+from typing import Any, Protocol
+
+import coal
+import numpy as np
+import pinocchio as pin
+
+from densarm.errors import InvalidValueError, UnknownNameError
+from densarm.shapes import circumscribed_cylinder
+from densarm.validation import finite_tuple, positive
+
+Vector3 = tuple[float, ...]
+_ORIGIN = (0.0, 0.0, 0.0)
+_UPRIGHT = (0.0, 0.0, 0.0, 1.0)
+
+
+class Obstacle(Protocol):
+    """A named convex body at a fixed pose."""
+
+    @property
+    def name(self) -> str:
+        """Name, unique in its scene."""
+
+    @property
+    def position(self) -> Vector3:
+        """Centre in the world [m]."""
+
+    @property
+    def orientation_xyzw(self) -> tuple[float, ...]:
+        """Unit quaternion x y z w of the body's frame in the world."""
+
+    def geometry(self) -> coal.CollisionGeometry:
+        """Return the shape whose distance coal differentiates."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Sphere:
+    """A ball.
+
+    Raises:
+        InvalidValueError: a size that is not positive, or a number that is not finite.
+    """
+
+    name: str
+    radius: float
+    """Radius [m]."""
+    position: Vector3 = _ORIGIN
+    """Centre in the world [m]."""
+    orientation_xyzw: tuple[float, ...] = _UPRIGHT
+    """Unit quaternion x y z w."""
+
+    def __post_init__(self) -> None:
+        _check_pose(self)
+        positive(f"{self.name}.radius", self.radius)
+
+    def geometry(self) -> coal.CollisionGeometry:
+        """Return coal's sphere."""
+        return coal.Sphere(self.radius)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Box:
+    """A box with full side lengths along its own axes.
+
+    Raises:
+        InvalidValueError: a size that is not positive, or a number that is not finite.
+    """
+
+    name: str
+    size: Vector3
+    """Full side lengths x y z [m]."""
+    position: Vector3 = _ORIGIN
+    """Centre in the world [m]."""
+    orientation_xyzw: tuple[float, ...] = _UPRIGHT
+    """Unit quaternion x y z w."""
+
+    def __post_init__(self) -> None:
+        _check_pose(self)
+        object.__setattr__(self, "size", finite_tuple(f"{self.name}.size", self.size, 3))
+        for side in self.size:
+            positive(f"{self.name}.size", side)
+
+    def geometry(self) -> coal.CollisionGeometry:
+        """Return coal's box."""
+        return coal.Box(*self.size)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Capsule:
+    """A cylinder along its own z axis with a half ball on each end.
+
+    Raises:
+        InvalidValueError: a size that is not positive, or a number that is not finite.
+    """
+
+    name: str
+    radius: float
+    """Radius [m]."""
+    length: float
+    """Length between the centres of the half balls [m]."""
+    position: Vector3 = _ORIGIN
+    """Centre in the world [m]."""
+    orientation_xyzw: tuple[float, ...] = _UPRIGHT
+    """Unit quaternion x y z w."""
+
+    def __post_init__(self) -> None:
+        _check_pose(self)
+        positive(f"{self.name}.radius", self.radius)
+        positive(f"{self.name}.length", self.length)
+
+    def geometry(self) -> coal.CollisionGeometry:
+        """Return coal's capsule."""
+        return coal.Capsule(self.radius, self.length)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Cylinder:
+    """A cylinder along its own z axis; distances are to a circumscribed 64-sided prism.
+
+    Raises:
+        InvalidValueError: a size that is not positive, or a number that is not finite.
+    """
+
+    name: str
+    radius: float
+    """Radius [m]."""
+    length: float
+    """Length [m]."""
+    position: Vector3 = _ORIGIN
+    """Centre in the world [m]."""
+    orientation_xyzw: tuple[float, ...] = _UPRIGHT
+    """Unit quaternion x y z w."""
+
+    def __post_init__(self) -> None:
+        _check_pose(self)
+        positive(f"{self.name}.radius", self.radius)
+        positive(f"{self.name}.length", self.length)
+
+    def geometry(self) -> coal.CollisionGeometry:
+        """Return the circumscribed prism, since coal's cylinder has no reliable gradient."""
+        return circumscribed_cylinder(self.radius, self.length)
+
+
+OBSTACLE_TYPES: Mapping[str, type[Any]] = {
+    "sphere": Sphere,
+    "box": Box,
+    "capsule": Capsule,
+    "cylinder": Cylinder,
+}
+"""Every kind of obstacle by the word that files use for it."""
+
+
+@dataclass(frozen=True)
+class Scene:
+    """Obstacles with distinct names.
+
+    Raises:
+        InvalidValueError: two obstacles share a name, or an entry is not an obstacle.
+    """
+
+    obstacles: tuple[Obstacle, ...] = ()
+
+    def __init__(self, obstacles: Iterable[Obstacle] = ()) -> None:
+        object.__setattr__(self, "obstacles", tuple(obstacles))
+        names: set[str] = set()
+        for obstacle in self.obstacles:
+            if not isinstance(obstacle, tuple(OBSTACLE_TYPES.values())):
+                kinds = ", ".join(kind.__name__ for kind in OBSTACLE_TYPES.values())
+                raise InvalidValueError("obstacle", obstacle, f"one of {kinds}")
+            if obstacle.name in names:
+                raise InvalidValueError("obstacle name", obstacle.name, "used only once in a scene")
+            names.add(obstacle.name)
+
+    def __len__(self) -> int:
+        return len(self.obstacles)
+
+    def __iter__(self) -> Iterator[Obstacle]:
+        return iter(self.obstacles)
+
+    def to_json(self) -> list[dict[str, Any]]:
+        """Return the obstacles as JSON data; `from_json` is its inverse."""
+        words = {kind: word for word, kind in OBSTACLE_TYPES.items()}
+        return [{"type": words[type(item)], **asdict(item)} for item in self]  # type: ignore[call-overload]
+
+    @classmethod
+    def from_json(cls, data: Iterable[Mapping[str, Any]]) -> "Scene":
+        """Build a scene from one mapping per obstacle: its type and its fields.
+
+        Raises:
+            UnknownNameError: an unknown type, or a field that the type does not have.
+            InvalidValueError: a missing field, or a value that is not allowed.
+        """
+        return cls(_obstacle_from_json(entry) for entry in data)
+
+
+def obstacle_pose(obstacle: Obstacle) -> pin.SE3:
+    """Return the pose of an obstacle's frame in the world."""
+    return pin.XYZQUATToSE3(np.array([*obstacle.position, *obstacle.orientation_xyzw]))
+
+
+def _obstacle_from_json(entry: Mapping[str, Any]) -> Obstacle:
+    if not isinstance(entry, Mapping):
+        raise InvalidValueError("obstacle", entry, "a table with the key 'type'")
+    values = dict(entry)
+    word = values.pop("type", None)
+    name = f"obstacle {values.get('name', '?')}"
+    if word not in OBSTACLE_TYPES:
+        raise UnknownNameError(f"type of {name}", word, OBSTACLE_TYPES)
+    kind = OBSTACLE_TYPES[word]
+    fields = kind.__dataclass_fields__
+    for key in values:
+        if key not in fields:
+            raise UnknownNameError(f"key of {name} ({word})", key, fields)
+    required = [key for key in fields if key in {"name", "radius", "size", "length"}]
+    for key in required:
+        if key not in values:
+            raise InvalidValueError(f"{name}.{key}", None, f"given for a {word}")
+    return kind(**values)  # type: ignore[no-any-return]
+
+
+def _check_pose(obstacle: Any) -> None:
+    name = obstacle.name
+    if not isinstance(name, str) or not name:
+        raise InvalidValueError("obstacle name", name, "a non-empty string")
+    position = finite_tuple(f"{name}.position", obstacle.position, 3)
+    quaternion = np.array(finite_tuple(f"{name}.orientation_xyzw", obstacle.orientation_xyzw, 4))
+    norm = np.linalg.norm(quaternion)
+    if not 0.99 <= norm <= 1.01:
+        allowed = "a unit quaternion x y z w"
+        raise InvalidValueError(f"{name}.orientation_xyzw", quaternion.tolist(), allowed)
+    unit = tuple((quaternion / norm).tolist()) if abs(norm - 1.0) > 1e-12 else tuple(quaternion.tolist())
+    object.__setattr__(obstacle, "position", position)
+    object.__setattr__(obstacle, "orientation_xyzw", unit)

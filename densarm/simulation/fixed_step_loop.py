@@ -1,0 +1,155 @@
+"""FixedStepLoop: plant and controller stepped together at a fixed rate."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from enum import Enum, auto
+
+import numpy as np
+
+from densarm.arm import Arm
+from densarm.arrays import Array
+from densarm.control.controller import Controller
+from densarm.errors import InvalidValueError
+from densarm.simulation.plant import Integrator, PinocchioPlant
+from densarm.validation import positive, positive_integer
+
+REACHED_POSITION = 0.01
+"""Largest position error of a joint at the goal [rad or m]."""
+REACHED_VELOCITY = 0.01
+"""Largest velocity of a joint at the goal [rad/s or m/s]."""
+
+_HELD_SHARE = 0.5  # the loop ends well inside the bounds above
+_STALL_MOTION = 0.01  # [rad or m] within the stall time
+_PROGRESS_INTERVAL = 200  # steps
+
+
+@dataclass(frozen=True)
+class SimulationParameters:
+    """Parameters of the fixed-step loop.
+
+    Raises:
+        InvalidValueError: a value out of its range.
+    """
+
+    dt: float = 0.001
+    """Time step of the plant [s]."""
+    integrator: Integrator = Integrator.SEMI_IMPLICIT_EULER
+    """How the plant is stepped."""
+    control_divisor: int = 1
+    """Plant steps per controller call; the torque is held between."""
+    time_limit: float = 60.0
+    """Simulated time after which the run ends [s]."""
+    hold_time: float = 0.1
+    """Time that the goal must be held [s]."""
+    stall_time: float = 1.0
+    """Time within which an arm away from the goal moves by 0.01 rad, or counts as stuck [s]."""
+
+    def __post_init__(self) -> None:
+        for name in ("dt", "time_limit", "hold_time", "stall_time"):
+            positive(f"simulation.{name}", getattr(self, name))
+        positive_integer("simulation.control_divisor", self.control_divisor)
+        if self.integrator not in set(Integrator):
+            allowed = "one of " + ", ".join(Integrator)
+            raise InvalidValueError("simulation.integrator", self.integrator, allowed)
+        if self.time_limit / self.dt > 1e7:
+            raise InvalidValueError(
+                "simulation.time_limit", self.time_limit, f"at most 1e7 steps of dt = {self.dt}"
+            )
+
+    @property
+    def control_period(self) -> float:
+        """Time between two calls of the controller [s]."""
+        return self.dt * self.control_divisor
+
+
+class LoopEnd(Enum):
+    """Why the loop ended."""
+
+    REACHED = auto()
+    STALLED = auto()
+    TIMED_OUT = auto()
+
+
+@dataclass(frozen=True)
+class Recording:
+    """Every state of a run, first and last included."""
+
+    time: Array
+    """k dt (N,) [s]."""
+    q: Array
+    """Configurations (N, nq)."""
+    v: Array
+    """Velocities (N, nv) [rad/s or m/s]."""
+    tau: Array
+    """Torque held from each sample to the next (N, nv) [N·m or N]; the last row repeats."""
+    end: LoopEnd
+
+
+class FixedStepLoop:
+    """Runs a controller on a simulated arm until the goal is held, the arm stalls, or time is up.
+
+    Args:
+        arm: the arm.
+        parameters: time step, integrator and limits of time.
+    """
+
+    def __init__(self, arm: Arm, parameters: SimulationParameters) -> None:
+        self._arm = arm
+        self._parameters = parameters
+        self._plant = PinocchioPlant(arm, parameters.dt, Integrator(parameters.integrator))
+
+    def run(
+        self,
+        controller: Controller,
+        start: Array,
+        goal: Array,
+        not_before: float = 0.0,
+        on_progress: Callable[[float], None] = lambda time: None,
+    ) -> Recording:
+        """Return the run from rest at the start.
+
+        Args:
+            controller: called every `control_divisor` steps.
+            start: configuration (nq,).
+            goal: configuration (nq,).
+            not_before: time [s] until which standing still is no stall.
+            on_progress: told the simulated time [s] now and then.
+        """
+        p, q, v = self._parameters, start, np.zeros(self._arm.nv)
+        held, end = 0, LoopEnd.TIMED_OUT
+        rest, rested_since = q, 0
+        states, torques = [(q, v)], []
+        for k in range(int(round(p.time_limit / p.dt))):
+            if k % p.control_divisor == 0:
+                tau = controller.torque(k * p.dt, q, v)
+            q, v = self._plant.step(q, v, tau)
+            states.append((q, v))
+            torques.append(tau)
+            held = held + 1 if self._is_at_goal(q, v, goal) else 0
+            if k * p.dt <= not_before or self._error(q, rest) > _STALL_MOTION:
+                rest, rested_since = q, k
+            if held * p.dt >= p.hold_time:
+                end = LoopEnd.REACHED
+                break
+            if (k - rested_since) * p.dt >= p.stall_time:
+                end = LoopEnd.STALLED
+                break
+            if k % _PROGRESS_INTERVAL == 0:
+                on_progress(k * p.dt)
+        torques.append(torques[-1])
+        return Recording(
+            time=p.dt * np.arange(len(states)),
+            q=np.array([state[0] for state in states]),
+            v=np.array([state[1] for state in states]),
+            tau=np.array(torques),
+            end=end,
+        )
+
+    def _is_at_goal(self, q: Array, v: Array, goal: Array) -> bool:
+        if np.abs(v).max() > _HELD_SHARE * REACHED_VELOCITY:
+            return False
+        return self._error(goal, q) <= _HELD_SHARE * REACHED_POSITION
+
+    def _error(self, q_a: Array, q_b: Array) -> float:
+        """Return the largest difference of a joint [rad or m]."""
+        return float(np.abs(self._arm.difference(q_a, q_b)).max())

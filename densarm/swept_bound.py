@@ -1,0 +1,140 @@
+"""SweptBound: proof that a straight joint-space segment touches nothing."""
+
+from copy import copy
+
+import numpy as np
+import pinocchio as pin
+
+from densarm.arrays import Array
+from densarm.clearance import DISTANCE_TOLERANCE, Clearance, joint_support
+from densarm.shapes import extreme_points
+from densarm.validation import non_negative
+
+
+class SweptBound:
+    """Bounds how far the bodies of each pair move, so that distances at ends prove what is between.
+
+    While the joints move by |Δq_j|, a point of one body of pair k moves against the other by
+    at most
+
+        μ_k = Σ_j r_kj |Δq_j|,
+
+    r_kj bounding, over all configurations, the distance from the axis of joint j to any point of
+    the body that it moves (1 for prismatic joints), over the joints that the two bodies do not
+    share. If d_k(q_a) + d_k(q_b) > μ_k the pair is apart on the whole segment.
+
+    Args:
+        clearance: the pairs.
+        margin: distance that must be exceeded for a pair to count as apart [m].
+
+    Raises:
+        InvalidValueError: a negative margin.
+    """
+
+    DEPTH_FLOOR = 1e-7
+    """Length of a segment [rad] below which an undecided segment counts as not clear."""
+
+    def __init__(self, clearance: Clearance, margin: float = 0.0) -> None:
+        self.clearance = clearance
+        self.arm = clearance.arm
+        self.margin = non_negative("margin", margin)
+        self.lever = self._pair_levers()
+        """The bounds r_kj (K, nv) [m/rad, 1 for prismatic joints]."""
+
+    def with_margin(self, margin: float) -> "SweptBound":
+        """Return the same bound under another margin [m]."""
+        other = copy(self)
+        other.margin = non_negative("margin", margin)
+        return other
+
+    def motion(self, step: Array) -> Array:
+        """Return μ_k (..., K) [m] of joint motions |Δq| (..., nv) [rad or m]."""
+        return np.asarray(np.abs(step) @ self.lever.T)
+
+    def slack(self, q: Array) -> Array:
+        """Return by how much each distance at q (nq,) surely exceeds the margin (K,) [m]."""
+        return self.clearance.distances(q) - (self.margin + DISTANCE_TOLERANCE)
+
+    def configuration_is_clear(self, q: Array) -> bool:
+        """Return whether every distance at q (nq,) exceeds the margin."""
+        return bool((self.slack(q) > 0.0).all())
+
+    def segment_is_clear(self, q_a: Array, q_b: Array) -> bool:
+        """Return whether every distance is proved above the margin on the whole segment.
+
+        Args:
+            q_a: one end (nq,).
+            q_b: the other end (nq,), reached the short way round on continuous joints.
+        """
+        return self.clear_subdivision(q_a, q_b) is not None
+
+    def clear_subdivision(self, q_a: Array, q_b: Array, surplus: float = 1.0) -> Array | None:
+        """Return where the proof split the segment, or None if it is not proved clear.
+
+        Args:
+            q_a: one end (nq,).
+            q_b: the other end (nq,).
+            surplus: factor >= 1 by which d(q_a) + d(q_b) must exceed μ; above 1 it splits more.
+
+        Returns:
+            Increasing fractions from 0 to 1; between neighbours one bound proves every pair.
+        """
+        step = self.arm.difference(q_a, q_b)
+        motion = surplus * self.motion(step)
+        floor = self.DEPTH_FLOOR / max(float(np.abs(step).max()), self.DEPTH_FLOOR)
+        slack = {0.0: self.slack(q_a), 1.0: self.slack(q_b)}
+        if any((ends <= 0.0).any() for ends in slack.values()):
+            return None
+        pending = [(0.0, 1.0)]
+        while pending:
+            a, b = pending.pop()
+            if (slack[a] + slack[b] > (b - a) * motion).all():
+                continue
+            middle = 0.5 * (a + b)
+            slack[middle] = self.slack(self.arm.integrate(q_a, middle * step))
+            if b - a <= floor or (slack[middle] <= 0.0).any():
+                return None
+            pending += [(a, middle), (middle, b)]
+        return np.array(sorted(slack))
+
+    def _pair_levers(self) -> Array:
+        model, shapes = self.arm.model, self.clearance.geometry_model.geometryObjects
+        support = joint_support(model)
+        lever = np.array([_levers(model, item) for item in shapes]).reshape(-1, model.nv)
+        moves = np.array([support[item.parentJoint] for item in shapes]).reshape(-1, model.nv)
+        first, second = self.clearance.pair_shapes.T
+        shared = moves[first] * moves[second]
+        return np.asarray((lever[first] + lever[second]) * (1.0 - shared))
+
+
+def _levers(model: pin.Model, shape: pin.GeometryObject) -> Array:
+    """Return, for one shape, the bound r_j (nv,) of every joint that moves it, else 0."""
+    levers = np.zeros(model.nv)
+    points, radius = extreme_points(shape.geometry) if shape.parentJoint else (np.zeros((1, 3)), 0.0)
+    points = points @ shape.placement.rotation.T + shape.placement.translation
+    joint = shape.parentJoint
+    reach = 0.0  # bounds the distance of the shape from the frame of the joint below
+    while joint > 0:
+        axis, slide = _axis_and_slide(model, joint)
+        across = points - np.outer(points @ axis, axis)
+        levers[model.joints[joint].idx_v] = (
+            1.0 if slide else reach + radius + np.linalg.norm(across, axis=1).max()
+        )
+        reach += radius + float(np.linalg.norm(points, axis=1).max())
+        reach += _extension(model, joint) if slide else 0.0
+        radius = 0.0
+        points = model.jointPlacements[joint].translation[np.newaxis]
+        joint = model.parents[joint]
+    return levers
+
+
+def _axis_and_slide(model: pin.Model, joint: int) -> tuple[Array, bool]:
+    """Return the joint's axis in its own frame, and whether it slides along it."""
+    subspace = model.joints[joint].createData().S.reshape(6)
+    slide = bool(np.abs(subspace[3:]).max() == 0.0)
+    return (subspace[:3] if slide else subspace[3:]), slide
+
+
+def _extension(model: pin.Model, joint: int) -> float:
+    index = model.joints[joint].idx_q
+    return float(max(abs(model.lowerPositionLimit[index]), abs(model.upperPositionLimit[index])))

@@ -1,0 +1,141 @@
+"""Trajectory: the record of a run, its summary, its file, and its certificate."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+from zipfile import BadZipFile
+
+import numpy as np
+
+from densarm.arrays import Array
+from densarm.atomic_file import atomic_file
+from densarm.certificates.certificate import Certificate, certify
+from densarm.errors import DensarmError, FileContentError
+from densarm.outcome import Outcome
+from densarm.scenario import Scenario
+
+
+@dataclass(frozen=True)
+class Trajectory:
+    """Every state of a run, first and last included, and how it ended."""
+
+    scenario: Scenario
+    time: Array
+    """k dt (N,) [s]."""
+    q: Array
+    """Configurations (N, nq)."""
+    v: Array
+    """Velocities (N, nv) [rad/s or m/s]."""
+    tau: Array
+    """Torque held from each sample to the next (N, nv) [N·m or N]; the last row repeats."""
+    clearance: Array
+    """Smallest signed distance over all pairs (N,) [m]; infinite without pairs."""
+    outcome: Outcome
+    detail: str = ""
+    """What stood in the way, in a phrase; empty when reached."""
+    plan_time: float = 0.0
+    """Wall-clock time of planning [s]; zero for the direct guide."""
+    tracking_error: float | None = field(default=None)
+    """Largest joint error against the reference [rad or m]; None without a reference."""
+
+    def verify(self) -> Certificate:
+        """Return what is proved about the run, computed anew from the record."""
+        return certify(self.scenario, self.time, self.q, self.v, self.tau)
+
+    @cached_property
+    def certified(self) -> bool:
+        """Whether `verify` holds in every part."""
+        return self.verify().certified
+
+    @property
+    def goal_error(self) -> float:
+        """Largest joint error at the end [rad or m]."""
+        arm = self.scenario.arm
+        return float(np.abs(arm.difference(self.scenario.goal_configuration, self.q[-1])).max())
+
+    @property
+    def peak_torque_ratio(self) -> float:
+        """Largest torque in units of its limit; joints without a limit do not count."""
+        return float((np.abs(self.tau) / self.scenario.arm.limits.effort).max())
+
+    def summary(self) -> dict[str, Any]:
+        """Return the run's figures as JSON data."""
+        smallest = float(self.clearance.min())
+        return {
+            "outcome": str(self.outcome),
+            "duration_s": float(self.time[-1]),
+            "min_clearance_m": smallest if np.isfinite(smallest) else None,
+            "goal_error_rad": self.goal_error,
+            "peak_torque_ratio": self.peak_torque_ratio,
+            "plan_time_s": self.plan_time,
+            "certified": self.certified,
+        }
+
+    def save(self, path: str | Path) -> None:
+        """Write the run to a .npz file, whole or not at all.
+
+        Args:
+            path: the file; its folder must exist.
+
+        Raises:
+            FileContentError: the file cannot be written.
+        """
+        result = {
+            "outcome": str(self.outcome),
+            "detail": self.detail,
+            "plan_time_s": self.plan_time,
+            "tracking_error_rad": self.tracking_error,
+        }
+        with atomic_file(Path(path)) as file:
+            np.savez_compressed(
+                file,
+                **{name: getattr(self, name) for name in _ARRAYS},
+                scenario=np.array(json.dumps(self.scenario.to_json())),
+                result=np.array(json.dumps(result)),
+            )
+
+    @classmethod
+    def load(cls, path: str | Path) -> Trajectory:
+        """Read a run that `save` wrote.
+
+        Raises:
+            FileContentError: no such file, or it is not a run.
+            DensarmError: its scenario cannot be rebuilt, e.g. since a mesh has changed.
+        """
+        try:
+            with np.load(path, allow_pickle=False) as data:
+                arrays = {name: np.asarray(data[name], dtype=np.float64) for name in _ARRAYS}
+                scenario = json.loads(str(data["scenario"]))
+                result = json.loads(str(data["result"]))
+            return cls(
+                scenario=Scenario.from_json(scenario),
+                **arrays,
+                outcome=Outcome(result["outcome"]),
+                detail=str(result["detail"]),
+                plan_time=float(result["plan_time_s"]),
+                tracking_error=result["tracking_error_rad"],
+            )._checked()
+        except OSError as error:
+            raise FileContentError(path, error.strerror or "not a run: not a .npz file") from None
+        except DensarmError as error:
+            raise FileContentError(path, f"not a run: {error}") from None
+        except (ValueError, KeyError, TypeError, EOFError, BadZipFile) as error:
+            raise FileContentError(path, f"not a run: {' '.join(str(error).split())}") from None
+
+    def _checked(self) -> Trajectory:
+        n, arm = len(self.time), self.scenario.arm
+        shapes = {"time": (n,), "q": (n, arm.nq), "v": (n, arm.nv), "tau": (n, arm.nv)}
+        for name, shape in shapes.items() | {("clearance", (n,))}:
+            array = getattr(self, name)
+            if array.shape != shape or n == 0:
+                raise DensarmError(f"{name} has shape {array.shape}, expected {shape}")
+            if name != "clearance" and not np.isfinite(array).all():
+                raise DensarmError(f"{name} has entries that are not finite")
+        return self
+
+
+_ARRAYS = ("time", "q", "v", "tau", "clearance")

@@ -1,0 +1,70 @@
+"""Checks of values at construction, each raising one `InvalidValueError`."""
+
+from collections.abc import Collection
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from densarm.arrays import Array
+from densarm.errors import InvalidValueError
+
+
+def finite_vector(name: str, value: ArrayLike, length: int, hint: str = "") -> Array:
+    """Return `value` as a float array of shape (length,).
+
+    Args:
+        name: how errors call the value.
+        value: anything numpy reads as a vector.
+        length: its required length.
+        hint: appended to the error of a wrong length.
+
+    Raises:
+        InvalidValueError: a wrong shape (expected and got), or an entry that is not finite.
+    """
+    try:
+        vector = np.array(value, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise InvalidValueError(name, value, f"{length} numbers") from None
+    if vector.shape != (length,):
+        shape = f"of shape ({length},), got {vector.shape}{hint}"
+        raise InvalidValueError(name, value, shape)
+    if not np.isfinite(vector).all():
+        raise InvalidValueError(name, value, "finite numbers")
+    return vector
+
+
+def finite_tuple(name: str, value: ArrayLike, length: int) -> tuple[float, ...]:
+    """Return `value` as a tuple of `length` finite floats; errors as `finite_vector`."""
+    return tuple(finite_vector(name, value, length).tolist())
+
+
+def positive(name: str, value: float) -> float:
+    """Return `value` if it is a finite number above zero, else raise InvalidValueError."""
+    if not _is_number(value) or not 0.0 < value < np.inf:
+        raise InvalidValueError(name, value, "a finite number > 0")
+    return float(value)
+
+
+def non_negative(name: str, value: float) -> float:
+    """Return `value` if it is a finite number, zero or above, else raise InvalidValueError."""
+    if not _is_number(value) or not 0.0 <= value < np.inf:
+        raise InvalidValueError(name, value, "a finite number >= 0")
+    return float(value)
+
+
+def positive_integer(name: str, value: int) -> int:
+    """Return `value` if it is an integer above zero, else raise InvalidValueError."""
+    if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < 1:
+        raise InvalidValueError(name, value, "an integer >= 1")
+    return int(value)
+
+
+def one_of(name: str, value: str, allowed: Collection[str]) -> str:
+    """Return `value` if it is among `allowed`, else raise InvalidValueError."""
+    if value not in allowed:
+        raise InvalidValueError(name, value, "one of " + ", ".join(sorted(allowed)))
+    return value
+
+
+def _is_number(value: object) -> bool:
+    return isinstance(value, int | float | np.number) and not isinstance(value, bool)

@@ -1,0 +1,1 @@
+"""Playback of runs by meshcat: live in the browser, or as one HTML file."""

@@ -1,0 +1,26 @@
+import os
+import shutil
+from pathlib import Path
+
+import pytest
+from hypothesis import settings
+
+import densarm
+
+# A process that a test starts imports the densarm under test, whatever its working directory.
+os.environ["PYTHONSAFEPATH"] = "1"
+os.environ["PYTHONPATH"] = str(Path(densarm.__file__).parents[1])
+
+# The first call of a compiled function takes seconds, so a deadline would measure the compiler.
+settings.register_profile("densarm", deadline=None, derandomize="CI" in os.environ)
+settings.load_profile("densarm")
+
+
+@pytest.fixture(scope="session")
+def chromium() -> str:
+    """Path of a Chromium; without one the test is skipped, or fails where one is required."""
+    path = shutil.which("chromium") or shutil.which("chromium-browser")
+    if path is None:
+        missing = pytest.fail if os.environ.get("DENSARM_REQUIRE_BROWSER") else pytest.skip
+        missing("no Chromium: apt-get install chromium")
+    return path

@@ -1,0 +1,124 @@
+"""Two-joint arms, bounded and continuous, and discs in their joint space."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from densarm.arm import Arm
+from densarm.arrays import Array
+from densarm.robot_description import RobotDescription
+
+BOUND = 3.0  # [m]
+
+JOINT = """<joint name="{name}" type="{kind}"><parent link="{parent}"/><child link="{child}"/>
+<axis xyz="{axis}"/>{limit}</joint>"""
+
+LINK = """<link name="{name}"><inertial><mass value="1"/>
+<inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial>
+<collision><geometry><sphere radius="0.1"/></geometry></collision></link>"""
+
+
+def _two_joint_arm(kinds: tuple[str, str], bound: float) -> Arm:
+    limit = f'<limit lower="{-bound}" upper="{bound}" effort="1" velocity="1"/>'
+    body = "".join(LINK.format(name=name) for name in "abc")
+    for kind, name, parent, child in zip(kinds, ("first", "second"), "ab", "bc", strict=True):
+        body += JOINT.format(
+            name=name,
+            kind=kind,
+            parent=parent,
+            child=child,
+            axis="1 0 0" if parent == "a" else "0 1 0",
+            limit="" if kind == "continuous" else limit,
+        )
+    return Arm(RobotDescription(name="two_joints", urdf=f'<robot name="two_joints">{body}</robot>'))
+
+
+@dataclass
+class DiscWorld:
+    """Discs in the space of two joints, periodic on circles; exact, and counting its answers."""
+
+    arm: Arm
+    centers: Array
+    """(D, 2)."""
+    radii: Array
+    """(D,)."""
+    segments: int = 0
+    configurations: int = 0
+
+    def gap(self, q: Array) -> Array:
+        """Return the least gap to a disc of configurations (..., nq)."""
+        offset = self.arm.angles(q)[..., None, :] - self.centers
+        circle = self.arm.is_circle
+        offset[..., circle] = (offset[..., circle] + np.pi) % (2 * np.pi) - np.pi
+        return np.min(np.linalg.norm(offset, axis=-1) - self.radii, axis=-1, initial=np.inf)
+
+    def configuration_is_clear(self, q: Array) -> bool:
+        """Return whether q is outside every disc."""
+        self.configurations += 1
+        return bool(self.gap(q) > 0.0)
+
+    def segment_is_clear(self, q_a: Array, q_b: Array) -> bool:
+        """Return whether a segment misses every disc and its copies."""
+        self.segments += 1
+        start, step = self.arm.angles(q_a), self.arm.difference(q_a, q_b)
+        turns = np.array([-1, 0, 1]) * 2 * np.pi
+        shifts = np.stack(np.meshgrid(*[turns * circle for circle in self.arm.is_circle]), -1)
+        to_center = (self.centers[:, None] + shifts.reshape(-1, 2)) - start
+        along = np.clip(to_center @ step / max(step @ step, 1e-300), 0.0, 1.0)
+        gap = np.linalg.norm(to_center - along[..., None] * step, axis=-1) - self.radii[:, None]
+        return bool(np.all(gap > 0.0))
+
+
+@pytest.fixture(scope="session")
+def make_arm() -> Callable[..., Arm]:
+    """Return a maker of two-joint arms."""
+
+    def make(first: str, second: str, bound: float = BOUND) -> Arm:
+        return _two_joint_arm((first, second), bound)
+
+    return make
+
+
+@pytest.fixture(
+    scope="session",
+    params=[("prismatic", "prismatic"), ("continuous", "continuous"), ("continuous", "prismatic")],
+    ids="-".join,
+)
+def arm(request: pytest.FixtureRequest) -> Arm:
+    """Return an arm of each mix of bounded and continuous joints."""
+    return _two_joint_arm(request.param, BOUND)
+
+
+@pytest.fixture(scope="session")
+def make_discs() -> Callable[..., DiscWorld]:
+    """Return a maker of disc worlds, each disc (x, y, radius)."""
+
+    def make(arm: Arm, *discs: tuple[float, float, float]) -> DiscWorld:
+        table = np.array(discs, dtype=float).reshape(-1, 3)
+        return DiscWorld(arm, table[:, :2], table[:, 2])
+
+    return make
+
+
+@pytest.fixture(scope="session")
+def enclosure() -> list[tuple[float, float, float]]:
+    """Return overlapping discs on a ring of radius 1 around the origin."""
+    angles = np.linspace(0.0, 2 * np.pi, 24, endpoint=False)
+    return [(float(np.cos(a)), float(np.sin(a)), 0.2) for a in angles]
+
+
+@pytest.fixture(scope="session")
+def samples_of() -> Callable[[Arm, Array], Array]:
+    """Return a function that samples the segments between waypoints densely."""
+
+    def sample(arm: Arm, waypoints: Array) -> Array:
+        fractions = np.linspace(0.0, 1.0, 501)[:, None]
+        edges = [fractions * arm.difference(a, b) for a, b in pairwise(waypoints)]
+        return np.concatenate(
+            [arm.integrate(*edge) for edge in zip(waypoints[:-1], edges, strict=True)]
+        )
+
+    return sample

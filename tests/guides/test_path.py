@@ -1,0 +1,185 @@
+"""PathGuide."""
+
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from densarm.errors import InvalidValueError
+from densarm.guides import GuidePath, NoPath, PathGuide, PathGuideParameters
+
+coordinate = st.floats(-2.9, 2.9)
+disc = st.tuples(coordinate, coordinate, st.floats(0.1, 1.2))
+
+
+@settings(max_examples=100, deadline=None)
+@given(
+    discs=st.lists(disc, max_size=6),
+    start=st.tuples(coordinate, coordinate),
+    goal=st.tuples(coordinate, coordinate),
+    seed=st.integers(0, 2**32),
+)
+def test_every_edge_of_a_path_is_clear(arm, make_discs, samples_of, discs, start, goal, seed):
+    world = make_discs(arm, *discs)
+    q_start, q_goal = arm.configuration(start), arm.configuration(goal)
+    answer = PathGuide(arm, world, PathGuideParameters(iterations=200, searches=2)).plan(
+        q_start, q_goal, seed
+    )
+    if isinstance(answer, NoPath):
+        assert not world.segment_is_clear(q_start, q_goal)
+        return
+    np.testing.assert_array_equal(answer.waypoints[[0, -1]], [q_start, q_goal])
+    samples = samples_of(arm, answer.waypoints)
+    assert world.gap(samples).min() > -1e-9
+    angles = arm.angles(samples)
+    assert (angles >= arm.limits.lower).all()
+    assert (angles <= arm.limits.upper).all()
+
+
+@pytest.fixture
+def wall(arm, make_discs):
+    """Discs that block the straight segment from (-1.5, 0) to (1.5, 0)."""
+    return make_discs(arm, (0.0, 0.0, 0.6), (0.0, 1.0, 0.6), (0.3, -0.9, 0.4))
+
+
+def ends(arm):
+    return arm.configuration([-1.5, 0.0]), arm.configuration([1.5, 0.0])
+
+
+def test_a_clear_straight_segment_is_the_path(arm, make_discs):
+    start, goal = ends(arm)
+    world = make_discs(arm)
+    path = PathGuide(arm, world).plan(start, goal, seed=0)
+    np.testing.assert_array_equal(path.waypoints, [start, goal])
+    assert world.segments == 1
+
+
+def test_same_seed_same_bits_whatever_ran_before(arm, wall):
+    guide = PathGuide(arm, wall)
+    first = {seed: guide.plan(*ends(arm), seed).waypoints for seed in (0, 1, 2)}
+    again = {seed: guide.plan(*ends(arm), seed).waypoints for seed in (2, 0, 1)}
+    for seed, waypoints in first.items():
+        np.testing.assert_array_equal(again[seed], waypoints)
+    assert not np.array_equal(first[0], first[1])
+
+
+@pytest.mark.parametrize("second", ["continuous", "prismatic"])
+def test_circle_joints_go_the_short_way(second, make_arm, make_discs, samples_of):
+    arm = make_arm("continuous", second)
+    start, goal = arm.configuration([2.6, 0.0]), arm.configuration([-2.6, 0.0])
+    world = make_discs(arm, (np.pi, 0.0, 0.2))
+    path = PathGuide(arm, world).plan(start, goal, seed=0).waypoints
+    assert len(path) > 2
+    length = np.linalg.norm(arm.difference(path[:-1], path[1:]), axis=1).sum()
+    assert 2 * np.pi - 5.2 < length < 1.5
+    assert (np.abs(arm.angles(samples_of(arm, path))[:, 0]) > 2.5).all()
+
+
+def test_bounded_revolute_joints_do_not_wrap(make_arm, make_discs):
+    arm = make_arm("revolute", "revolute")
+    start, goal = arm.configuration([2.9, 0.0]), arm.configuration([-2.9, 0.0])
+    path = PathGuide(arm, make_discs(arm, (0.0, 0.0, 0.5))).plan(start, goal, 0).waypoints
+    assert np.linalg.norm(np.diff(path, axis=0), axis=1).sum() > 5.8
+
+
+def test_an_enclosed_goal_has_no_path(arm, make_discs, enclosure):
+    parameters = PathGuideParameters(iterations=100, searches=2)
+    guide = PathGuide(arm, make_discs(arm, *enclosure), parameters)
+    answer = guide.plan(arm.configuration([-2.0, 0.0]), arm.configuration([0.0, 0.0]), 0)
+    assert isinstance(answer, NoPath)
+    assert "2 searches" in answer.reason
+    assert "100 iterations" in answer.reason
+
+
+def test_an_end_in_contact_is_named(arm, wall):
+    free, blocked = arm.configuration([-1.5, 0.0]), arm.configuration([0.0, 0.0])
+    guide = PathGuide(arm, wall)
+    assert guide.plan(blocked, free, 0) == NoPath("the start is not clear of contact")
+    assert guide.plan(free, blocked, 0) == NoPath("the goal is not clear of contact")
+
+
+def test_an_end_outside_limits_is_named(make_arm, make_discs):
+    arm = make_arm("prismatic", "continuous")
+    guide = PathGuide(arm, make_discs(arm))
+    answer = guide.plan(arm.configuration([0.0, 0.0]), arm.configuration([3.1, 0.0]), 0)
+    assert answer == NoPath("the goal is outside the position limits of first")
+
+
+def test_ends_on_the_limits_and_on_the_seam_are_allowed(make_arm, make_discs):
+    arm = make_arm("prismatic", "continuous")
+    world = make_discs(arm, (0.0, np.pi, 1.0))
+    start, goal = arm.configuration([-3.0, np.pi]), arm.configuration([3.0, -np.pi])
+    assert isinstance(PathGuide(arm, world).plan(start, goal, 0), GuidePath)
+
+
+def test_a_joint_without_an_interval_is_refused(make_arm, make_discs):
+    arm = make_arm("prismatic", "continuous", bound=0.0)
+    with pytest.raises(InvalidValueError, match=r"joint 'first'.*lock the joint"):
+        PathGuide(arm, make_discs(arm))
+
+
+@pytest.mark.parametrize("field", ["iterations", "searches", "extension", "shortcuts"])
+def test_parameters_are_positive(field):
+    with pytest.raises(InvalidValueError, match=field):
+        PathGuideParameters(**{field: 0})
+
+
+@pytest.mark.parametrize("answers", [1, 3, 5, 10])
+def test_an_interrupt_ends_the_plan_and_the_next_one_is_whole(answers, arm, wall):
+    expected = PathGuide(arm, wall).plan(*ends(arm), 0).waypoints
+    wall.segments = 0
+
+    class Interrupted:
+        configuration_is_clear = staticmethod(wall.configuration_is_clear)
+
+        def segment_is_clear(self, q_a, q_b):
+            if wall.segments == answers:
+                os.kill(os.getpid(), signal.SIGINT)
+            return wall.segment_is_clear(q_a, q_b)
+
+    with pytest.raises(KeyboardInterrupt):
+        PathGuide(arm, Interrupted()).plan(*ends(arm), 0)
+    assert wall.segments in (answers, answers + 1)
+    np.testing.assert_array_equal(PathGuide(arm, wall).plan(*ends(arm), 0).waypoints, expected)
+
+
+PROGRAM = """
+import sys
+sys.path.insert(0, {folder!r})
+from conftest import DiscWorld, _two_joint_arm
+import numpy as np
+from densarm.guides import NoPath, PathGuide, PathGuideParameters
+arm = _two_joint_arm(("continuous", "prismatic"), 3.0)
+world = DiscWorld(arm, np.array([[0.0, 0.0]]), np.array([0.8]))
+q = arm.configuration
+path = PathGuide(arm, world).plan(q([-1.5, 0.0]), q([1.5, 0.0]), 7)
+world.centers, world.radii = np.array([[x, 1.5] for x in range(-4, 4)]), np.full(8, 0.8)
+parameters = PathGuideParameters(iterations=50, searches=1)
+assert isinstance(PathGuide(arm, world, parameters).plan(q([0, 0]), q([0, 2.9]), 7), NoPath)
+print(path.waypoints.tobytes().hex())
+"""
+
+
+def test_a_new_process_gives_the_same_bits_and_says_nothing():
+    program = PROGRAM.format(folder=str(Path(__file__).parent))
+    runs = [
+        subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+        for _ in range(2)
+    ]
+    assert [run.stderr for run in runs] == ["", ""]
+    assert runs[0].stdout == runs[1].stdout
+    assert len(runs[0].stdout.splitlines()) == 1
+
+
+def test_importing_guides_leaves_ompl_alone():
+    program = "import sys, densarm.guides; print('ompl' in sys.modules)"
+    run = subprocess.run(
+        [sys.executable, "-c", program], capture_output=True, text=True, check=True
+    )
+    assert run.stdout.strip() == "False"

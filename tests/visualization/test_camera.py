@@ -1,0 +1,31 @@
+import numpy as np
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+from numpy.typing import NDArray
+
+from densarm.visualization.camera import FIELD_OF_VIEW, Camera
+
+POINTS = arrays(np.float64, st.tuples(st.integers(2, 12), st.just(3)), elements=st.floats(-5, 5))
+
+
+@given(POINTS)
+def test_every_point_is_in_the_picture(points: NDArray[np.float64]) -> None:
+    camera = Camera.facing(points)
+    if not np.any(np.ptp(points, axis=0) > 1e-3):
+        return
+    back = camera.offset / np.linalg.norm(camera.offset)
+    right = np.cross([0.0, 0.0, 1.0], back)
+    right /= np.linalg.norm(right)
+    seen = (points - camera.target) @ np.column_stack([right, np.cross(back, right), back])
+    depth = np.linalg.norm(camera.offset) - seen[:, 2]
+    slope = np.tan(np.radians(FIELD_OF_VIEW / 2))
+    assert np.all(depth > 0.0)
+    assert np.all(np.abs(seen[:, 1]) <= slope * depth)
+    assert np.all(np.abs(seen[:, 0]) <= 4 / 3 * slope * depth)
+
+
+def test_planar_arm_is_seen_from_the_front() -> None:
+    plane = np.array([[-2.0, -0.05, -2.0], [2.0, 0.05, 2.0], [2.0, 0.0, -2.0]])
+    offset = Camera.facing(plane).offset
+    assert -offset[1] > 5.0 * np.abs(offset[[0, 2]]).max()
