@@ -1,1 +1,190 @@
-"""Collision-free motion of robot arms by navigation density functions."""
+"""Collision-free motion of robot arms by navigation density functions.
+
+Every name is imported when it is first used, so that ``import densarm`` is quick.
+"""
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from densarm.arm import Arm, JointLimits, load_arm
+    from densarm.certificates.certificate import Certificate, Check
+    from densarm.clearance import Clearance, ClearanceSample
+    from densarm.control.controller import Controller
+    from densarm.control.density_feedback import DensityFeedback
+    from densarm.control.density_regulation import DensityRegulation
+    from densarm.control.density_tracking import DensityTracking
+    from densarm.control.gains import Gains
+    from densarm.density.gauge import Gauge
+    from densarm.density.goal_distance import EuclideanDistance, ProductDistance, TorusDistance
+    from densarm.density.navigation_density import (
+        DensityParameters,
+        DensitySample,
+        NavigationDensity,
+    )
+    from densarm.density.unsafe_set import ClearanceSet, ImplicitSet, JointLimitSet
+    from densarm.errors import (
+        DensarmError,
+        FileContentError,
+        InvalidValueError,
+        RobotDescriptionError,
+        UnknownNameError,
+    )
+    from densarm.fields.speed_law import SpeedParameters
+    from densarm.fields.sub_goal_chain import SensingParameters
+    from densarm.guides.direct import DirectGuide
+    from densarm.guides.guide import Guide, GuidePath, NoPath
+    from densarm.guides.path import PathGuide, PathGuideParameters
+    from densarm.motion_plan import MotionPlan, plan_motion
+    from densarm.outcome import Outcome
+    from densarm.reference.reference import Reference
+    from densarm.reference.timing_parameters import TimingParameters
+    from densarm.robot_description import RobotDescription
+    from densarm.scenario import (
+        ControlForm,
+        ControlParameters,
+        GuideKind,
+        Scenario,
+        load_scenario,
+    )
+    from densarm.scene import Box, Capsule, Cylinder, Scene, Sphere
+    from densarm.closed_loop import make_controller, simulate
+    from densarm.simulation.fixed_step_loop import SimulationParameters
+    from densarm.simulation.plant import Integrator, PinocchioPlant
+    from densarm.swept_bound import SweptBound
+    from densarm.trajectory import Trajectory
+    from densarm.visualization.plots import save_plot
+    from densarm.visualization.view import save_html, view
+
+    __version__: str
+
+__all__ = [
+    "Arm",
+    "Box",
+    "Capsule",
+    "Certificate",
+    "Check",
+    "Clearance",
+    "ClearanceSample",
+    "ClearanceSet",
+    "ControlForm",
+    "ControlParameters",
+    "Controller",
+    "Cylinder",
+    "DensarmError",
+    "DensityFeedback",
+    "DensityParameters",
+    "DensityRegulation",
+    "DensitySample",
+    "DensityTracking",
+    "DirectGuide",
+    "EuclideanDistance",
+    "FileContentError",
+    "Gains",
+    "Gauge",
+    "Guide",
+    "GuideKind",
+    "GuidePath",
+    "ImplicitSet",
+    "Integrator",
+    "InvalidValueError",
+    "JointLimitSet",
+    "JointLimits",
+    "MotionPlan",
+    "NavigationDensity",
+    "NoPath",
+    "Outcome",
+    "PathGuide",
+    "PathGuideParameters",
+    "PinocchioPlant",
+    "ProductDistance",
+    "Reference",
+    "RobotDescription",
+    "RobotDescriptionError",
+    "Scenario",
+    "Scene",
+    "SensingParameters",
+    "SimulationParameters",
+    "SpeedParameters",
+    "Sphere",
+    "SweptBound",
+    "TimingParameters",
+    "TorusDistance",
+    "Trajectory",
+    "UnknownNameError",
+    "__version__",
+    "load_arm",
+    "load_scenario",
+    "make_controller",
+    "plan_motion",
+    "save_html",
+    "save_plot",
+    "simulate",
+    "view",
+]
+
+_NAMES = {
+    "arm": ("Arm", "JointLimits", "load_arm"),
+    "certificates.certificate": ("Certificate", "Check"),
+    "clearance": ("Clearance", "ClearanceSample"),
+    "control.controller": ("Controller",),
+    "control.density_feedback": ("DensityFeedback",),
+    "control.density_regulation": ("DensityRegulation",),
+    "control.density_tracking": ("DensityTracking",),
+    "control.gains": ("Gains",),
+    "density.gauge": ("Gauge",),
+    "density.goal_distance": ("EuclideanDistance", "ProductDistance", "TorusDistance"),
+    "density.navigation_density": ("DensityParameters", "DensitySample", "NavigationDensity"),
+    "density.unsafe_set": ("ClearanceSet", "ImplicitSet", "JointLimitSet"),
+    "errors": (
+        "DensarmError",
+        "FileContentError",
+        "InvalidValueError",
+        "RobotDescriptionError",
+        "UnknownNameError",
+    ),
+    "fields.speed_law": ("SpeedParameters",),
+    "fields.sub_goal_chain": ("SensingParameters",),
+    "guides.direct": ("DirectGuide",),
+    "guides.guide": ("Guide", "GuidePath", "NoPath"),
+    "guides.path": ("PathGuide", "PathGuideParameters"),
+    "motion_plan": ("MotionPlan", "plan_motion"),
+    "outcome": ("Outcome",),
+    "reference.reference": ("Reference",),
+    "reference.timing_parameters": ("TimingParameters",),
+    "robot_description": ("RobotDescription",),
+    "scenario": ("ControlForm", "ControlParameters", "GuideKind", "Scenario", "load_scenario"),
+    "scene": ("Box", "Capsule", "Cylinder", "Scene", "Sphere"),
+    "closed_loop": ("make_controller", "simulate"),
+    "simulation.fixed_step_loop": ("SimulationParameters",),
+    "simulation.plant": ("Integrator", "PinocchioPlant"),
+    "swept_bound": ("SweptBound",),
+    "trajectory": ("Trajectory",),
+    "visualization.plots": ("save_plot",),
+    "visualization.view": ("save_html", "view"),
+}
+_MODULE_OF = {name: module for module, names in _NAMES.items() for name in names}
+
+
+def __getattr__(name: str) -> Any:
+    if name == "__version__":
+        value: Any = _version()
+    elif name in _MODULE_OF:
+        value = getattr(import_module(f"densarm.{_MODULE_OF[name]}"), name)
+    else:
+        raise AttributeError(f"module 'densarm' has no attribute {name!r}")
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})
+
+
+def _version() -> str:
+    from importlib.metadata import PackageNotFoundError, version
+
+    try:
+        return version("densarm")
+    except PackageNotFoundError:
+        return "0+checkout"

@@ -1,7 +1,7 @@
 """Arm: Pinocchio's model of a robot arm, its geometry, limits and named postures."""
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 from hashlib import sha256
 from pathlib import Path
@@ -11,33 +11,15 @@ import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 
 from densarm.arrays import Array
-from densarm.catalogue import robot_names, robot_description
-from densarm.errors import FileContentError, InvalidValueError, UnknownNameError
+from densarm.catalogue import robot_description, robot_names
+from densarm.errors import InvalidValueError, UnknownNameError
+from densarm.joint_limits import JointLimits, joint_limits
 from densarm.robot_description import RobotDescription, read_text
-from densarm.robot_models import build_models, build_visual_model
+from densarm.robot_models import build_models, build_visual_model, joint_names
 from densarm.self_collision import srdf_postures
-from densarm.validation import finite_vector
+from densarm.validation import finite_tuple, finite_vector, one_of
 
-DEFAULT_ACCELERATION = 10.0
-"""Acceleration limit where nothing is known [rad/s² or m/s²]; a URDF carries none."""
-
-_UNLIMITED = 1e12  # URDFs write huge numbers where a joint has no limit
-
-
-@dataclass(frozen=True)
-class JointLimits:
-    """Limits of the joints, each of shape (nv,); infinite where a joint has none."""
-
-    lower: Array
-    """Lower position limit [rad or m]; minus infinity on continuous joints."""
-    upper: Array
-    """Upper position limit [rad or m]; infinity on continuous joints."""
-    velocity: Array
-    """Velocity limit [rad/s or m/s]."""
-    acceleration: Array
-    """Acceleration limit [rad/s² or m/s²]."""
-    effort: Array
-    """Torque or force limit [N·m or N]."""
+__all__ = ["Arm", "JointLimits", "load_arm"]
 
 
 class Arm:
@@ -61,7 +43,7 @@ class Arm:
         self.joint_names: tuple[str, ...] = tuple(self.model.names)[1:]
         self.idx_q: NDArray[np.int64] = np.array([joint.idx_q for joint in joints])
         self.is_circle: NDArray[np.bool_] = np.array([joint.nq == 2 for joint in joints])
-        self.limits = self._limits()
+        self.limits: JointLimits = joint_limits(self.model, description.acceleration)
         self.end_effector = self._end_effector()
         self.postures: dict[str, Array] = self._postures()
 
@@ -71,8 +53,9 @@ class Arm:
         return build_visual_model(self.description)
 
     def mesh_hashes(self) -> dict[str, str]:
-        """Return the SHA-256 of each collision mesh file, by file name."""
-        return {file.name: sha256(file.read_bytes()).hexdigest() for file in self._mesh_files}
+        """Return the SHA-256 of each collision mesh file, by its path from their common folder."""
+        files = self._mesh_files.items()
+        return {name: sha256(file.read_bytes()).hexdigest() for name, file in files}
 
     def configuration(self, angles: ArrayLike) -> Array:
         """Return the configuration q of joint positions.
@@ -118,7 +101,7 @@ class Arm:
             InvalidValueError: a wrong length, an entry that is not finite, or a (cos, sin) pair
                 of a continuous joint that is not of length one.
         """
-        hint = f" (from one number per joint: arm.configuration(angles))" if self.nq != self.nv else ""
+        hint = "" if self.nq == self.nv else " (from one number per joint: arm.configuration)"
         vector = finite_vector(name, q, self.nq, hint)
         for joint in np.flatnonzero(self.is_circle):
             pair = vector[self.idx_q[joint] : self.idx_q[joint] + 2]
@@ -179,25 +162,6 @@ class Arm:
         v = finite_vector("velocity", v, self.nv)
         return np.array(pin.nonLinearEffects(self.model, self.data, q, v))
 
-    def _limits(self) -> JointLimits:
-        model, bounded = self.model, ~self.is_circle
-        lower, upper = np.full(self.nv, -np.inf), np.full(self.nv, np.inf)
-        lower[bounded] = model.lowerPositionLimit[self.idx_q[bounded]]
-        upper[bounded] = model.upperPositionLimit[self.idx_q[bounded]]
-        given = self.description.acceleration
-        acceleration = (
-            np.full(self.nv, DEFAULT_ACCELERATION)
-            if given is None
-            else finite_vector("acceleration", given, self.nv)
-        )
-        return JointLimits(
-            lower=lower,
-            upper=upper,
-            velocity=_limit_or_infinity(model.upperVelocityLimit),
-            acceleration=acceleration,
-            effort=_limit_or_infinity(model.upperEffortLimit),
-        )
-
     def _end_effector(self) -> str:
         names = [frame.name for frame in self.model.frames]
         name = self.description.end_effector
@@ -208,7 +172,7 @@ class Arm:
         return name
 
     def _postures(self) -> dict[str, Array]:
-        postures = {"neutral": self.configuration(np.clip(0.0, self.limits.lower, self.limits.upper))}
+        postures: dict[str, Array] = {}
         for name, positions in srdf_postures(self.description.srdf).items():
             if set(self.joint_names) <= set(positions):
                 postures[name] = self.configuration([positions[j] for j in self.joint_names])
@@ -240,13 +204,16 @@ def load_arm(
 
     Raises:
         UnknownNameError: no such robot, joint to lock, or link of the SRDF.
+        InvalidValueError: a locked position or base placement that is not finite, or shapes that
+            the robot does not come with.
         FileContentError: a file that cannot be read.
         RobotDescriptionError: a URDF or SRDF that cannot be used.
     """
     path = Path(robot)
     if str(robot) in robot_names():
         description = robot_description(str(robot), shapes)
-    elif path.suffix in {".urdf", ".xml", ".xacro"} or path.is_file():
+    elif path.suffix == ".urdf" or path.is_file():
+        one_of("shapes", shapes, ["hull"])
         description = _description_of_file(path)
     else:
         raise UnknownNameError("robot", robot, [*robot_names(), "the path of a .urdf file"])
@@ -255,10 +222,8 @@ def load_arm(
 
 def _description_of_file(path: Path) -> RobotDescription:
     folder = path.resolve().parent
-    nearby = [folder, *folder.parents[:3]]
-    return RobotDescription(
-        name=path.stem, urdf=read_text(path), package_dirs=tuple(str(p) for p in nearby)
-    )
+    nearby = tuple(str(above) for above in (folder, *folder.parents))
+    return RobotDescription(name=path.stem, urdf=read_text(path), package_dirs=nearby)
 
 
 def _with_options(
@@ -268,14 +233,17 @@ def _with_options(
     locked_joints: Mapping[str, float] | None,
     base_placement: pin.SE3 | None,
 ) -> RobotDescription:
+    if base_placement is not None and not isinstance(base_placement, pin.SE3):
+        raise InvalidValueError("base_placement", base_placement, "a pinocchio.SE3")
     if isinstance(package_dirs, str | Path):
         package_dirs = [package_dirs]
     folders = tuple(str(Path(folder).resolve()) for folder in package_dirs)
+    if locked_joints:
+        description = _without_joints(description, locked_joints)
     return replace(
         description,
         srdf=description.srdf if srdf is None else read_text(Path(srdf)),
         package_dirs=folders + description.package_dirs,
-        locked_joints={**description.locked_joints, **(locked_joints or {})},
         base_placement=(
             description.base_placement
             if base_placement is None
@@ -284,6 +252,17 @@ def _with_options(
     )
 
 
-def _limit_or_infinity(limit: Array) -> Array:
-    limit = np.array(limit, dtype=np.float64)
-    return np.where((limit <= 0.0) | (limit >= _UNLIMITED), np.inf, limit)
+def _without_joints(description: RobotDescription, locked: Mapping[str, float]) -> RobotDescription:
+    """Lock joints, and take their entries out of the values given per joint."""
+    names = joint_names(description)
+    kept = [i for i, name in enumerate(names) if name not in locked]
+    given, postures = description.acceleration, description.postures
+    return replace(
+        description,
+        locked_joints={
+            **description.locked_joints,
+            **{j: finite_tuple(f"locked_joints.{j}", [x], 1)[0] for j, x in locked.items()},
+        },
+        acceleration=None if given is None else tuple(given[i] for i in kept),
+        postures={key: tuple(angles[i] for i in kept) for key, angles in postures.items()},
+    )

@@ -27,8 +27,8 @@ def atomic_file(path: Path) -> Iterator[BinaryIO]:
     try:
         with os.fdopen(descriptor, "wb") as file:
             yield file
-        os.chmod(temporary, 0o644)
-        os.replace(temporary, path)
+        Path(temporary).chmod(0o644)  # mkstemp gives access to the owner alone
+        Path(temporary).replace(path)
     except OSError as error:
         raise FileContentError(path, f"cannot be written: {error.strerror}") from None
     finally:

@@ -10,6 +10,7 @@ from densarm.arm import Arm
 from densarm.arrays import Array
 from densarm.compiled import compiled
 from densarm.distance_view import DistanceView
+from densarm.errors import InvalidValueError
 from densarm.scene import Scene, obstacle_pose
 
 COAL_TOLERANCE = 1e-10
@@ -43,6 +44,9 @@ class Clearance:
     Args:
         arm: the arm; its collision model holds the self-collision pairs.
         scene: the obstacles. Shapes that no joint moves are not paired with them.
+
+    Raises:
+        InvalidValueError: an obstacle is named like a shape of the arm.
     """
 
     def __init__(self, arm: Arm, scene: Scene) -> None:
@@ -51,11 +55,13 @@ class Clearance:
         self.geometry_model = _geometry_model(arm, scene)
         self.geometry_data = self.geometry_model.createData()
         self._data = arm.model.createData()
-        self._jacobian = self._data.J
+        # A view that follows the data; Pinocchio drops the second axis of a single column.
+        self._jacobian = self._data.J.reshape(6, arm.nv)
         for request in self.geometry_data.distanceRequests:
             request.gjk_tolerance = request.epa_tolerance = COAL_TOLERANCE
         self.pair_shapes: NDArray[np.int64] = np.array(
-            [(pair.first, pair.second) for pair in self.geometry_model.collisionPairs], dtype=np.int64
+            [(pair.first, pair.second) for pair in self.geometry_model.collisionPairs],
+            dtype=np.int64,
         ).reshape(-1, 2)
         names = [item.name for item in self.geometry_model.geometryObjects]
         self.pairs = tuple((names[i], names[j]) for i, j in self.pair_shapes)
@@ -92,19 +98,25 @@ class Clearance:
                 self._view.read(), self._jacobian, self._sign, self.distance, self.gradient
             )
 
-    def distances(self, q: Array) -> Array:
-        """Return a new array of the distances (K,) [m] at q (nq,), without gradients or checks."""
-        if not self.n_pairs:
-            return np.zeros(0)
-        self._query(q)
-        return self._view.read()[:, 0].copy()
+    def distances(self, q: Array, pairs: NDArray[np.int64] | None = None) -> Array:
+        """Return a new array of distances [m] at q (nq,), without gradients or checks.
 
-    def _query(self, q: Array) -> None:
-        pin.updateGeometryPlacements(
-            self.arm.model, self._data, self.geometry_model, self.geometry_data, q
-        )
-        if self.n_pairs:
-            pin.computeDistances(self.geometry_model, self.geometry_data)
+        Args:
+            q: configuration (nq,).
+            pairs: indices of the pairs to compute; None for all, (K,).
+        """
+        self._query(q, pairs)
+        distance = self._view.read()[:, 0]
+        return distance.copy() if pairs is None else distance[pairs]
+
+    def _query(self, q: Array, pairs: NDArray[np.int64] | None = None) -> None:
+        model, data = self.geometry_model, self.geometry_data
+        pin.updateGeometryPlacements(self.arm.model, self._data, model, data, q)
+        if pairs is not None and len(pairs) < self.n_pairs:
+            for k in pairs.tolist():
+                pin.computeDistance(model, data, k)
+        elif self.n_pairs:
+            pin.computeDistances(model, data)
 
     def _joint_signs(self) -> Array:
         """Return S_2 - S_1 (K, nv): how each joint moves body 2 against body 1."""
@@ -129,6 +141,9 @@ def _geometry_model(arm: Arm, scene: Scene) -> pin.GeometryModel:
     model = arm.collision_model.copy()
     moving = [k for k, item in enumerate(model.geometryObjects) if item.parentJoint > 0]
     for obstacle in scene:
+        if arm.collision_model.existGeometryName(obstacle.name):
+            allowed = f"other than the names of the shapes of {arm.name!r}"
+            raise InvalidValueError("obstacle name", obstacle.name, allowed)
         item = pin.GeometryObject(obstacle.name, 0, 0, obstacle_pose(obstacle), obstacle.geometry())
         index = model.addGeometryObject(item)
         for k in moving:

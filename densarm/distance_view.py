@@ -24,6 +24,7 @@ class DistanceView:
     """
 
     def __init__(self, geometry_data: pin.GeometryData) -> None:
+        self._geometry_data = geometry_data  # owns the memory that the view reads
         self._results = list(geometry_data.distanceResults)
         strided = self._strided()
         self.is_direct = strided is not None
@@ -47,7 +48,7 @@ class DistanceView:
         count = (stride // 8) * (len(addresses) - 1) + _FIELDS
         memory = (ctypes.c_double * count).from_address(addresses[0] - 8)
         rows = np.lib.stride_tricks.as_strided(
-            np.frombuffer(memory), (len(addresses), _FIELDS), (stride, 8), writeable=False
+            np.ctypeslib.as_array(memory), (len(addresses), _FIELDS), (stride, 8), writeable=False
         )
         return rows if np.array_equal(rows, self._by_getters()) else None
 

@@ -1,4 +1,4 @@
-"""MotionPlan: from a guide's sub-goals to the planning system's timed trajectory."""
+"""MotionPlan: from a guide's sub-goals to what a controller follows."""
 
 from dataclasses import dataclass
 
@@ -7,14 +7,18 @@ import numpy as np
 from densarm.arrays import Array
 from densarm.clearance import Clearance
 from densarm.fields.guided_density import GuidedDensity
-from densarm.fields.planning_system import PlannedCurve, PlanningSystem
+from densarm.fields.planning_system import PlanningSystem
 from densarm.fields.sub_goal_chain import SubGoalChain
 from densarm.guides.direct import DirectGuide
 from densarm.guides.guide import Guide, NoPath
 from densarm.guides.path import PathGuide
 from densarm.reference.reference import Reference
 from densarm.scenario import ControlForm, GuideKind, Scenario
+from densarm.simulation.fixed_step_loop import REACHED_POSITION
 from densarm.swept_bound import SweptBound
+
+_LIMIT_INSET = 0.2 * REACHED_POSITION
+"""Distance from position limits that the motion leaves and reaches its ends at [rad or m]."""
 
 _END_SHARE = 0.5
 """Share of the clearance at start and goal that a path's margin may take."""
@@ -28,22 +32,19 @@ class MotionPlan:
     """The density along the sub-goals."""
     bound: SweptBound
     """The swept bound under the scenario's margin."""
-    reference: Reference
-    """The timed trajectory of the planning system, to where it got."""
-    curve: PlannedCurve
-    """The planning system's curve."""
+    reference: Reference | None
+    """The timed trajectory of the planning system, to where it got, if it is to be tracked."""
 
 
 def plan_motion(
-    scenario: Scenario, clearance: Clearance, guide: Guide | GuideKind, seed: int
+    scenario: Scenario, clearance: Clearance, guide: Guide | GuideKind
 ) -> MotionPlan | NoPath:
-    """Plan a motion: sub-goals, integral curve, smooth path, timing.
+    """Plan a motion: sub-goals, and for tracking the integral curve, a smooth path, its timing.
 
     Args:
-        scenario: start, goal and parameters.
+        scenario: start, goal, parameters and seed.
         clearance: of the scenario's arm and scene.
         guide: supplies the sub-goals.
-        seed: of the guide's random choices.
 
     Raises:
         InfeasibleTimingError: the limits allow no motion along the path.
@@ -51,29 +52,42 @@ def plan_motion(
     arm, control = scenario.arm, scenario.control
     start, goal = scenario.start_configuration, scenario.goal_configuration
     bound = SweptBound(clearance, control.margin)
-    ends = min(bound.slack(q).min(initial=np.inf) for q in (start, goal))
-    room = min(control.path_margin, _END_SHARE * ends)
+    depart, arrive = (_inside_limits(bound, q) for q in (start, goal))
+    ends = min(bound.slack(q).min(initial=np.inf) for q in (start, depart, arrive))
+    room = max(0.0, min(control.path_margin, _END_SHARE * ends))
     path_bound = bound.with_margin(control.margin + room)
-    if isinstance(guide, GuideKind):
-        guide = (
-            DirectGuide()
-            if guide == GuideKind.DIRECT
-            else PathGuide(arm, path_bound, scenario.planning)
-        )
-    path = guide.plan(start, goal, seed)
+    if guide == GuideKind.DIRECT:
+        guide = DirectGuide()
+    elif guide == GuideKind.PATH:
+        guide = PathGuide(arm, path_bound, scenario.planning)
+    path = guide.plan(depart, arrive, scenario.seed)
     if isinstance(path, NoPath):
         return path
     chain = SubGoalChain(bound, path, scenario.sensing)
     guided = GuidedDensity(
         clearance, chain, control.margin, scenario.density, control.kappa, _weights(scenario)
     )
-    curve = PlanningSystem(guided, bound).integrate(start)
+    if control.form != ControlForm.TRACKING:
+        return MotionPlan(guided, bound, reference=None)
+    curve = PlanningSystem(guided, bound).integrate(depart)
     guided.restart()
     smooth_bound = bound.with_margin(control.margin + (0.5 * room if path.is_clear else 0.0))
-    reference = _reference(scenario, smooth_bound, curve.q)
+    reference = _reference(scenario, smooth_bound, np.vstack([start, curve.q]))
     if reference is None:
         return NoPath("no smooth path near the planning system's curve is proved clear")
-    return MotionPlan(guided, bound, reference, curve)
+    return MotionPlan(guided, bound, reference)
+
+
+def _inside_limits(bound: SweptBound, q: Array) -> Array:
+    """Return where to leave or to reach q (nq,), at which the density must not vanish.
+
+    A configuration at a position limit is on the rim of an unsafe set. The motion keeps a little
+    inside, well within what counts as reached, unless something touches there.
+    """
+    arm, limits = bound.arm, bound.arm.limits
+    low, high = limits.lower + _LIMIT_INSET, limits.upper - _LIMIT_INSET
+    inside = arm.configurations(np.clip(arm.angles(q), low, high))
+    return inside if bound.segment_is_clear(q, inside) else q
 
 
 def _weights(scenario: Scenario) -> Array | None:
@@ -81,7 +95,7 @@ def _weights(scenario: Scenario) -> Array | None:
     if scenario.control.form != ControlForm.PLAIN:
         return None
     inertia = scenario.arm.mass_matrix(scenario.goal_configuration).diagonal()
-    return inertia / inertia.max()
+    return np.asarray(inertia / inertia.max())
 
 
 def _reference(scenario: Scenario, bound: SweptBound, curve: Array) -> Reference | None:

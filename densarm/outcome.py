@@ -24,6 +24,6 @@ _DESCRIPTIONS = {
     Outcome.STUCK: "The arm came to rest away from the goal, where the density has no slope.",
     Outcome.COLLIDED: "The arm touched an obstacle or itself.",
     Outcome.TIMED_OUT: "The time limit ended the run before the goal was reached and held.",
-    Outcome.INFEASIBLE: "The start or the goal is in contact or outside the limits.",
+    Outcome.INFEASIBLE: "Start or goal is in contact or outside limits, or torque is too weak.",
     Outcome.NO_PATH: "The guide found no collision-free path to the goal.",
 }

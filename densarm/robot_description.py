@@ -99,9 +99,9 @@ def read_text(path: Path) -> str:
         FileContentError: there is no such file, or it is not text.
     """
     try:
-        return path.read_text(encoding="utf-8")
+        return path.read_text(encoding="utf-8-sig")
     except (OSError, UnicodeDecodeError) as error:
-        reason = error.strerror if isinstance(error, OSError) else "not a text file"
+        reason = error.strerror if isinstance(error, OSError) else "not a UTF-8 text file"
         raise FileContentError(path, str(reason)) from None
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, replace
 from enum import StrEnum
-from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +12,8 @@ from densarm.arm import Arm, load_arm
 from densarm.arrays import Array
 from densarm.catalogue import read_toml, scenario_paths
 from densarm.control.gains import Gains
-from densarm.density import DensityParameters
+from densarm.density import DensityParameters, Gauge
+from densarm.density.goal_distance import KAPPA_MIN
 from densarm.errors import (
     DensarmError,
     FileContentError,
@@ -29,7 +29,7 @@ from densarm.robot_description import RobotDescription
 from densarm.scene import Scene
 from densarm.simulation.fixed_step_loop import SimulationParameters
 from densarm.tables import parse_table
-from densarm.validation import finite_tuple, non_negative
+from densarm.validation import finite_tuple, non_negative, non_negative_integer, one_of
 
 
 class GuideKind(StrEnum):
@@ -54,7 +54,11 @@ class ControlForm(StrEnum):
 
 @dataclass(frozen=True)
 class ControlParameters:
-    """Which controller, and the guide it follows."""
+    """Which controller, and the guide it follows.
+
+    Raises:
+        InvalidValueError: a value out of its range.
+    """
 
     form: ControlForm = ControlForm.TRACKING
     """The controller."""
@@ -68,21 +72,26 @@ class ControlParameters:
     """κ of the goal distance, between product and sum."""
 
     def __post_init__(self) -> None:
-        non_negative("control.margin", self.margin)
-        non_negative("control.path_margin", self.path_margin)
+        object.__setattr__(self, "form", ControlForm(one_of("form", self.form, list(ControlForm))))
+        object.__setattr__(self, "guide", GuideKind(one_of("guide", self.guide, list(GuideKind))))
+        non_negative("margin", self.margin)
+        non_negative("path_margin", self.path_margin)
+        if not self.kappa >= KAPPA_MIN:
+            raise InvalidValueError("kappa", self.kappa, f"a number >= {KAPPA_MIN}, or infinity")
 
 
 @dataclass(frozen=True)
 class Scenario:
-    """Everything that determines a run, but for the seed.
+    """Everything that determines a run.
 
     Raises:
-        InvalidValueError: start or goal is not one finite number per joint.
+        InvalidValueError: start or goal is not one finite number per joint, the seed is not a
+            whole number, or the density gives no feedback that settles at a goal.
     """
 
     name: str
     title: str
-    robot: RobotDescription
+    arm: Arm
     scene: Scene
     start: tuple[float, ...]
     """Joint positions at the start, one number per joint [rad or m]."""
@@ -102,11 +111,8 @@ class Scenario:
     def __post_init__(self) -> None:
         for key in ("start", "goal"):
             object.__setattr__(self, key, finite_tuple(key, getattr(self, key), self.arm.nv))
-
-    @cached_property
-    def arm(self) -> Arm:
-        """The arm, built when first asked for."""
-        return Arm(self.robot)
+        non_negative_integer("seed", self.seed)
+        _check_feedback(self.density)
 
     @property
     def start_configuration(self) -> Array:
@@ -124,7 +130,7 @@ class Scenario:
             "format": FORMAT,
             "name": self.name,
             "title": self.title,
-            "robot": self.robot.to_json(),
+            "robot": self.arm.description.to_json(),
             "mesh_sha256": self.arm.mesh_hashes(),
             "obstacles": self.scene.to_json(),
             "start": list(self.start),
@@ -144,9 +150,9 @@ class Scenario:
             raise DensarmError(f"scenario: not of format {FORMAT}")
         try:
             scenario = cls(
-                name=data["name"],
-                title=data["title"],
-                robot=RobotDescription.from_json(data["robot"]),
+                name=str(data["name"]),
+                title=str(data["title"]),
+                arm=Arm(RobotDescription.from_json(data["robot"])),
                 scene=Scene.from_json(data["obstacles"]),
                 start=data["start"],
                 goal=data["goal"],
@@ -158,7 +164,7 @@ class Scenario:
             raise DensarmError(f"scenario: the key {error} is missing") from None
         if scenario.arm.mesh_hashes() != recorded:
             raise RobotDescriptionError(
-                f"robot {scenario.robot.name!r}: its mesh files have changed since the recording"
+                f"robot {scenario.arm.name!r}: its mesh files have changed since the recording"
             )
         return scenario
 
@@ -214,21 +220,28 @@ def _parse(path: Path, data: dict[str, Any]) -> Scenario:
     obstacles = data.get("obstacles", [])
     if not isinstance(obstacles, list):
         raise InvalidValueError("obstacles", obstacles, "a list of tables [[obstacles]]")
-    seed = data.get("seed", 0)
-    if not isinstance(seed, int) or isinstance(seed, bool) or seed < 0:
-        raise InvalidValueError("seed", seed, "an integer >= 0")
-    scenario = Scenario(
+    return Scenario(
         name=path.stem,
         title=str(data.get("title", path.stem)),
-        robot=arm.description,
+        arm=arm,
         scene=Scene.from_json(obstacles),
         start=_joint_positions(arm, "task.start", task.start),
         goal=_joint_positions(arm, "task.goal", task.goal),
-        seed=seed,
+        seed=data.get("seed", 0),
         **{key: parse_table(key, kind, data.get(key, {})) for key, kind in TABLES.items()},
     )
-    scenario.__dict__["arm"] = arm
-    return scenario
+
+
+def _check_feedback(density: DensityParameters) -> None:
+    """Refuse a density whose gradient is singular or flat at the goal and not blended there."""
+    smooth = density.gauge == Gauge.RECIPROCAL and density.alpha == 1.0
+    if not smooth and density.blend_radius == 0.0:
+        raise InvalidValueError(
+            "density.blend_radius",
+            density.blend_radius,
+            f"above 0 in gauge {str(density.gauge)!r} with alpha = {density.alpha:g}, whose "
+            "gradient is singular or flat at the goal (or use gauge 'reciprocal', alpha = 1)",
+        )
 
 
 @dataclass(frozen=True)
@@ -269,9 +282,7 @@ def _parse_robot(folder: Path, table: _RobotTable) -> Arm:
     return Arm(replace(arm.description, **changes)) if changes else arm
 
 
-def _joint_positions(
-    arm: Arm, key: str, value: str | tuple[float, ...]
-) -> tuple[float, ...]:
+def _joint_positions(arm: Arm, key: str, value: str | tuple[float, ...]) -> tuple[float, ...]:
     if isinstance(value, str):
         if value not in arm.postures:
             raise UnknownNameError(f"posture for {key}", value, arm.postures)

@@ -10,7 +10,7 @@ import pinocchio as pin
 
 from densarm.errors import InvalidValueError, UnknownNameError
 from densarm.shapes import circumscribed_cylinder
-from densarm.validation import finite_tuple, positive
+from densarm.validation import finite_tuple, positive, unit_quaternion
 
 Vector3 = tuple[float, ...]
 _ORIGIN = (0.0, 0.0, 0.0)
@@ -53,8 +53,7 @@ class Sphere:
     """Unit quaternion x y z w."""
 
     def __post_init__(self) -> None:
-        _check_pose(self)
-        positive(f"{self.name}.radius", self.radius)
+        _check(self, "radius")
 
     def geometry(self) -> coal.CollisionGeometry:
         """Return coal's sphere."""
@@ -78,10 +77,9 @@ class Box:
     """Unit quaternion x y z w."""
 
     def __post_init__(self) -> None:
-        _check_pose(self)
-        object.__setattr__(self, "size", finite_tuple(f"{self.name}.size", self.size, 3))
-        for side in self.size:
-            positive(f"{self.name}.size", side)
+        _check(self)
+        size = finite_tuple(f"{self.name}.size", self.size, 3)
+        object.__setattr__(self, "size", tuple(positive(f"{self.name}.size", s) for s in size))
 
     def geometry(self) -> coal.CollisionGeometry:
         """Return coal's box."""
@@ -107,9 +105,7 @@ class Capsule:
     """Unit quaternion x y z w."""
 
     def __post_init__(self) -> None:
-        _check_pose(self)
-        positive(f"{self.name}.radius", self.radius)
-        positive(f"{self.name}.length", self.length)
+        _check(self, "radius", "length")
 
     def geometry(self) -> coal.CollisionGeometry:
         """Return coal's capsule."""
@@ -135,9 +131,7 @@ class Cylinder:
     """Unit quaternion x y z w."""
 
     def __post_init__(self) -> None:
-        _check_pose(self)
-        positive(f"{self.name}.radius", self.radius)
-        positive(f"{self.name}.length", self.length)
+        _check(self, "radius", "length")
 
     def geometry(self) -> coal.CollisionGeometry:
         """Return the circumscribed prism, since coal's cylinder has no reliable gradient."""
@@ -207,7 +201,7 @@ def _obstacle_from_json(entry: Mapping[str, Any]) -> Obstacle:
     values = dict(entry)
     word = values.pop("type", None)
     name = f"obstacle {values.get('name', '?')}"
-    if word not in OBSTACLE_TYPES:
+    if not isinstance(word, str) or word not in OBSTACLE_TYPES:
         raise UnknownNameError(f"type of {name}", word, OBSTACLE_TYPES)
     kind = OBSTACLE_TYPES[word]
     fields = kind.__dataclass_fields__
@@ -221,16 +215,15 @@ def _obstacle_from_json(entry: Mapping[str, Any]) -> Obstacle:
     return kind(**values)  # type: ignore[no-any-return]
 
 
-def _check_pose(obstacle: Any) -> None:
+def _check(obstacle: Any, *sizes: str) -> None:
+    """Check an obstacle's fields, and store them as tuples and floats."""
     name = obstacle.name
     if not isinstance(name, str) or not name:
         raise InvalidValueError("obstacle name", name, "a non-empty string")
-    position = finite_tuple(f"{name}.position", obstacle.position, 3)
-    quaternion = np.array(finite_tuple(f"{name}.orientation_xyzw", obstacle.orientation_xyzw, 4))
-    norm = np.linalg.norm(quaternion)
-    if not 0.99 <= norm <= 1.01:
-        allowed = "a unit quaternion x y z w"
-        raise InvalidValueError(f"{name}.orientation_xyzw", quaternion.tolist(), allowed)
-    unit = tuple((quaternion / norm).tolist()) if abs(norm - 1.0) > 1e-12 else tuple(quaternion.tolist())
-    object.__setattr__(obstacle, "position", position)
-    object.__setattr__(obstacle, "orientation_xyzw", unit)
+    values: dict[str, Any] = {
+        "position": finite_tuple(f"{name}.position", obstacle.position, 3),
+        "orientation_xyzw": unit_quaternion(f"{name}.orientation_xyzw", obstacle.orientation_xyzw),
+        **{size: positive(f"{name}.{size}", getattr(obstacle, size)) for size in sizes},
+    }
+    for field, value in values.items():
+        object.__setattr__(obstacle, field, value)

@@ -5,11 +5,14 @@ from itertools import combinations
 import numpy as np
 import pinocchio as pin
 
-from densarm.errors import UnknownNameError
+from densarm.arrays import Array
+from densarm.errors import RobotDescriptionError, UnknownNameError
 from densarm.robot_description import parse_robot_xml
 
-_SAMPLES = 100
+_SAMPLES = 1000
 """Random configurations by which a pair that always collides is recognised."""
+
+_FARTHEST = 100.0  # [rad or m], of joint positions drawn from wider limits
 
 
 def add_self_collision_pairs(
@@ -18,7 +21,7 @@ def add_self_collision_pairs(
     """Add the self-collision pairs of an arm to its collision model.
 
     Left out are two shapes on the same or on neighbouring joints, the pairs that the SRDF
-    disables, and the pairs that collide in every one of 100 random configurations.
+    disables, and the pairs that collide in every one of 1000 random configurations.
 
     Args:
         model: the arm.
@@ -42,26 +45,38 @@ def add_self_collision_pairs(
 def srdf_postures(srdf: str | None) -> dict[str, dict[str, float]]:
     """Return the SRDF's ``group_state`` entries: posture name to joint name to position.
 
+    States of one name in several groups make one posture.
+
     Args:
         srdf: the SRDF's text, or None.
+
+    Raises:
+        RobotDescriptionError: the SRDF is not one, or a value is not a finite number.
     """
-    if srdf is None:
-        return {}
-    states = parse_robot_xml(srdf, "SRDF").iter("group_state")
-    return {
-        state.get("name", ""): {
-            joint.get("name", ""): float(joint.get("value", "nan").split()[0])
-            for joint in state.iter("joint")
-        }
-        for state in states
-    }
+    postures: dict[str, dict[str, float]] = {}
+    states = [] if srdf is None else parse_robot_xml(srdf, "SRDF").iter("group_state")
+    for state in states:
+        posture = postures.setdefault(state.get("name", ""), {})
+        for joint in state.iter("joint"):
+            posture[joint.get("name", "")] = _position(joint.get("value", ""))
+    return postures
+
+
+def _position(text: str) -> float:
+    try:
+        position = float(text.split(maxsplit=1)[0])
+    except (ValueError, IndexError):
+        position = np.nan
+    if not np.isfinite(position):
+        raise RobotDescriptionError(f"SRDF: group_state: value {text!r} is not a finite number")
+    return position
 
 
 def _are_neighbours(model: pin.Model, joints: set[int]) -> bool:
     if len(joints) == 1:
         return True
     a, b = joints
-    return model.parents[a] == b or model.parents[b] == a
+    return bool(model.parents[a] == b or model.parents[b] == a)
 
 
 def _disabled_links(model: pin.Model, srdf: str) -> set[frozenset[str]]:
@@ -91,16 +106,14 @@ def _always_colliding(model: pin.Model, geometry: pin.GeometryModel) -> list[pin
     return [pair for pair, always in zip(pairs, colliding, strict=True) if always]
 
 
-def _random_configuration(model: pin.Model, random: np.random.Generator) -> np.ndarray:
+def _random_configuration(model: pin.Model, random: np.random.Generator) -> Array:
     # pin.randomConfiguration draws from a global seed and fails on unbounded joints.
-    q = pin.neutral(model)
+    q = np.zeros(model.nq)
+    limits = np.clip([model.lowerPositionLimit, model.upperPositionLimit], -_FARTHEST, _FARTHEST)
     for joint in list(model.joints)[1:]:
         if joint.nq == 2:
             angle = random.uniform(-np.pi, np.pi)
             q[joint.idx_q : joint.idx_q + 2] = np.cos(angle), np.sin(angle)
         else:
-            low, high = (
-                limit[joint.idx_q] for limit in (model.lowerPositionLimit, model.upperPositionLimit)
-            )
-            q[joint.idx_q] = random.uniform(max(low, -10.0), min(high, 10.0))
+            q[joint.idx_q] = random.uniform(*limits[:, joint.idx_q])
     return q

@@ -10,7 +10,11 @@ from densarm.errors import RobotDescriptionError
 CYLINDER_SIDES = 64
 """Sides of the prism that stands for a cylinder; it exceeds the radius by 0.12 %."""
 
-_CAPSULE_TOLERANCE = 1e-6  # [m], agreement of a cylinder's ends with the spheres on them
+# [m], agreement of a cylinder's ends with the spheres on them: URDFs write 1.57 for a right angle.
+_CAPSULE_TOLERANCE = 1e-4
+
+_FLATNESS = 1e-9  # thickness over width of points that count as lying in one plane
+_FARTHEST = 1e6  # [m]
 
 
 def convex_hull(points: Array) -> coal.ConvexBase:
@@ -22,11 +26,7 @@ def convex_hull(points: Array) -> coal.ConvexBase:
     Raises:
         RobotDescriptionError: the points span no volume.
     """
-    mesh = coal.BVHModelOBBRSS()
-    mesh.beginModel(0, len(points))
-    mesh.addVertices(np.asarray(points, dtype=np.float64))
-    mesh.endModel()
-    return _hull_of_mesh(mesh)
+    return _hull(np.asarray(points, dtype=np.float64), "the set of points")
 
 
 def circumscribed_cylinder(radius: float, length: float) -> coal.ConvexBase:
@@ -47,14 +47,16 @@ def differentiable_geometry(model: pin.Model, geometry: pin.GeometryModel) -> pi
     """Return a geometry model of shapes whose distance coal differentiates.
 
     Spheres, boxes, capsules and convex hulls stay; a mesh becomes its convex hull, a cylinder
-    with an equal sphere on each end one capsule, any other cylinder a circumscribed prism.
+    with an equal sphere on each end one capsule, any other cylinder a circumscribed prism. Each
+    encloses what it stands for.
 
     Args:
         model: the arm's model, whose frames name the links.
         geometry: its collision geometry as the URDF gives it.
 
     Raises:
-        RobotDescriptionError: a shape of another kind (ellipsoid, cone, plane, ...), by name.
+        RobotDescriptionError: a shape of another kind (ellipsoid, cone, plane, ...), of a size
+            that is not positive, or a mesh without volume; by name.
     """
     result = pin.GeometryModel()
     by_link: dict[int, list[pin.GeometryObject]] = {}
@@ -84,60 +86,87 @@ def extreme_points(shape: coal.CollisionGeometry) -> tuple[Array, float]:
     if isinstance(shape, coal.Box):
         signs = np.array(np.meshgrid([-1, 1], [-1, 1], [-1, 1])).reshape(3, 8).T
         return signs * np.asarray(shape.halfSide), 0.0
-    return np.array([shape.point(i) for i in range(shape.num_points)]), 0.0
+    return np.array(shape.points()), 0.0
 
 
 def _differentiable_shape(item: pin.GeometryObject, link: str) -> coal.CollisionGeometry:
     shape = item.geometry
+    if not all(size > 0.0 for size in _sizes(shape)):
+        raise RobotDescriptionError(
+            f"collision geometry {item.name!r} of link {link!r} has a size that is not positive"
+        )
     if isinstance(shape, coal.Sphere | coal.Box | coal.Capsule | coal.ConvexBase):
         return shape
     if isinstance(shape, coal.Cylinder):
         return circumscribed_cylinder(shape.radius, 2.0 * shape.halfLength)
     if isinstance(shape, coal.BVHModelBase):
-        return _hull_of_mesh(shape, item.name)
+        return _hull(shape.vertices(), f"collision mesh {item.name!r} of link {link!r}")
     raise RobotDescriptionError(
         f"collision geometry {item.name!r} of link {link!r} is a {type(shape).__name__}, whose "
         "distance has no reliable gradient: use a sphere, box, capsule, cylinder or mesh"
     )
 
 
-def _hull_of_mesh(mesh: coal.BVHModelBase, name: str = "points") -> coal.ConvexBase:
-    try:
-        mesh.buildConvexHull(True, "Qt")
-    except RuntimeError:
-        raise RobotDescriptionError(
-            f"collision mesh {name!r} has no convex hull: its vertices span no volume"
-        ) from None
+def _sizes(shape: coal.CollisionGeometry) -> list[float]:
+    if isinstance(shape, coal.Box):
+        return list(shape.halfSide)
+    return [getattr(shape, size) for size in ("radius", "halfLength") if hasattr(shape, size)]
+
+
+def _hull(points: Array, name: str) -> coal.ConvexBase:
+    # coal ends the process when it meets points that are not finite or that lie in one plane.
+    if not (np.abs(points) < _FARTHEST).all():
+        raise RobotDescriptionError(f"{name} has vertices that are not finite, or beyond 1000 km")
+    if _is_flat(points):
+        raise RobotDescriptionError(f"{name} has no convex hull: its vertices span no volume")
+    mesh = coal.BVHModelOBBRSS()
+    mesh.beginModel(0, len(points))
+    mesh.addVertices(points)
+    mesh.endModel()
+    mesh.buildConvexHull(True, "Qt")
     return mesh.convex
 
 
+def _is_flat(points: Array) -> bool:
+    if len(points) < 4:
+        return True
+    width = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
+    return bool(width[2] <= _FLATNESS * width[0])
+
+
 def _merge_capsules(items: list[pin.GeometryObject]) -> list[pin.GeometryObject]:
-    """Replace each cylinder and the two equal spheres on its ends by one capsule."""
+    """Return copies of the items, one capsule for each cylinder and the spheres on its ends."""
     spheres = [item for item in items if isinstance(item.geometry, coal.Sphere)]
-    merged: list[pin.GeometryObject] = []
+    capsules: dict[str, coal.Capsule] = {}
     used: set[str] = set()
     for item in items:
-        if not isinstance(item.geometry, coal.Cylinder):
-            continue
-        caps = [_sphere_at_end(item, sign, spheres) for sign in (-1.0, 1.0)]
-        if all(caps):
-            used |= {item.name, *(cap.name for cap in caps if cap)}
-            shape = coal.Capsule(item.geometry.radius, 2.0 * item.geometry.halfLength)
-            merged.append(
-                pin.GeometryObject(
-                    item.name, item.parentJoint, item.parentFrame, item.placement, shape
-                )
+        caps = _caps(item, spheres) if isinstance(item.geometry, coal.Cylinder) else None
+        if caps is not None:
+            excess = max(mismatch for _, mismatch in caps)
+            capsules[item.name] = coal.Capsule(
+                item.geometry.radius + excess, 2.0 * item.geometry.halfLength
             )
-    return [item.copy() for item in items if item.name not in used] + merged
+            used |= {sphere for sphere, _ in caps}
+    merged = [item.copy() for item in items if item.name not in used]
+    for item in merged:
+        item.geometry = capsules.get(item.name, item.geometry)
+    return merged
 
 
-def _sphere_at_end(
-    cylinder: pin.GeometryObject, sign: float, spheres: list[pin.GeometryObject]
-) -> pin.GeometryObject | None:
-    end = cylinder.placement.act(np.array([0.0, 0.0, sign * cylinder.geometry.halfLength]))
-    for sphere in spheres:
-        offset = np.linalg.norm(sphere.placement.translation - end)
-        excess = abs(sphere.geometry.radius - cylinder.geometry.radius)
-        if offset + excess <= _CAPSULE_TOLERANCE:
-            return sphere
-    return None
+def _caps(
+    cylinder: pin.GeometryObject, spheres: list[pin.GeometryObject]
+) -> list[tuple[str, float]] | None:
+    """Return the spheres on both ends, by name, and how far each sticks out of a capsule [m]."""
+    caps = []
+    for sign in (-1.0, 1.0):
+        end = cylinder.placement.act(np.array([0.0, 0.0, sign * cylinder.geometry.halfLength]))
+        mismatches = {
+            sphere.name: float(np.linalg.norm(sphere.placement.translation - end))
+            + abs(sphere.geometry.radius - cylinder.geometry.radius)
+            for sphere in spheres
+        }
+        name = min(mismatches, key=mismatches.__getitem__, default="")
+        if not name or mismatches[name] > _CAPSULE_TOLERANCE:
+            return None
+        caps.append((name, mismatches[name]))
+    return caps

@@ -6,6 +6,7 @@ import numpy as np
 import pinocchio as pin
 
 from densarm.arrays import Array
+from densarm.bisection import Pairs, bisect
 from densarm.clearance import DISTANCE_TOLERANCE, Clearance, joint_support
 from densarm.shapes import extreme_points
 from densarm.validation import non_negative
@@ -14,8 +15,8 @@ from densarm.validation import non_negative
 class SweptBound:
     """Bounds how far the bodies of each pair move, so that distances at ends prove what is between.
 
-    While the joints move by |Δq_j|, a point of one body of pair k moves against the other by
-    at most
+    While the joints move by |Δq_j|, within their limits, a point of one body of pair k moves
+    against the other by at most
 
         μ_k = Σ_j r_kj |Δq_j|,
 
@@ -31,8 +32,8 @@ class SweptBound:
         InvalidValueError: a negative margin.
     """
 
-    DEPTH_FLOOR = 1e-7
-    """Length of a segment [rad] below which an undecided segment counts as not clear."""
+    DEPTH_FLOOR = 1e-5
+    """Length of a segment [rad or m] at which one still not proved clear counts as not clear."""
 
     def __init__(self, clearance: Clearance, margin: float = 0.0) -> None:
         self.clearance = clearance
@@ -47,13 +48,24 @@ class SweptBound:
         other.margin = non_negative("margin", margin)
         return other
 
-    def motion(self, step: Array) -> Array:
-        """Return μ_k (..., K) [m] of joint motions |Δq| (..., nv) [rad or m]."""
-        return np.asarray(np.abs(step) @ self.lever.T)
+    def motion(self, step: Array, pairs: Pairs | None = None) -> Array:
+        """Return the bounds μ_k [m] on how far bodies move.
 
-    def slack(self, q: Array) -> Array:
-        """Return by how much each distance at q (nq,) surely exceeds the margin (K,) [m]."""
-        return self.clearance.distances(q) - (self.margin + DISTANCE_TOLERANCE)
+        Args:
+            step: joint motions (..., nv) [rad or m].
+            pairs: indices of the pairs to look at; None for all, (..., K).
+        """
+        lever = self.lever if pairs is None else self.lever[pairs]
+        return np.asarray(np.abs(step) @ lever.T)
+
+    def slack(self, q: Array, pairs: Pairs | None = None) -> Array:
+        """Return by how much distances surely exceed the margin [m].
+
+        Args:
+            q: configuration (nq,).
+            pairs: indices of the pairs to look at; None for all, (K,).
+        """
+        return self.clearance.distances(q, pairs) - (self.margin + DISTANCE_TOLERANCE)
 
     def configuration_is_clear(self, q: Array) -> bool:
         """Return whether every distance at q (nq,) exceeds the margin."""
@@ -80,22 +92,16 @@ class SweptBound:
             Increasing fractions from 0 to 1; between neighbours one bound proves every pair.
         """
         step = self.arm.difference(q_a, q_b)
+        length = float(np.abs(step).max())
         motion = surplus * self.motion(step)
-        floor = self.DEPTH_FLOOR / max(float(np.abs(step).max()), self.DEPTH_FLOOR)
-        slack = {0.0: self.slack(q_a), 1.0: self.slack(q_b)}
-        if any((ends <= 0.0).any() for ends in slack.values()):
-            return None
-        pending = [(0.0, 1.0)]
-        while pending:
-            a, b = pending.pop()
-            if (slack[a] + slack[b] > (b - a) * motion).all():
-                continue
-            middle = 0.5 * (a + b)
-            slack[middle] = self.slack(self.arm.integrate(q_a, middle * step))
-            if b - a <= floor or (slack[middle] <= 0.0).any():
-                return None
-            pending += [(a, middle), (middle, b)]
-        return np.array(sorted(slack))
+        result = bisect(
+            slack=lambda t, pairs: self.slack(self.arm.integrate(q_a, t * step), pairs),
+            motion=lambda a, b, pairs: (b - a) * motion[pairs],
+            split=lambda a, b: 0.5 * (a + b) if (b - a) * length > self.DEPTH_FLOOR else None,
+            ends=(0.0, 1.0),
+            n_pairs=self.clearance.n_pairs,
+        )
+        return None if len(result.failing) else result.evaluated
 
     def _pair_levers(self) -> Array:
         model, shapes = self.arm.model, self.clearance.geometry_model.geometryObjects
@@ -110,19 +116,18 @@ class SweptBound:
 def _levers(model: pin.Model, shape: pin.GeometryObject) -> Array:
     """Return, for one shape, the bound r_j (nv,) of every joint that moves it, else 0."""
     levers = np.zeros(model.nv)
-    points, radius = extreme_points(shape.geometry) if shape.parentJoint else (np.zeros((1, 3)), 0.0)
+    points, reach = extreme_points(shape.geometry)
     points = points @ shape.placement.rotation.T + shape.placement.translation
     joint = shape.parentJoint
-    reach = 0.0  # bounds the distance of the shape from the frame of the joint below
     while joint > 0:
+        # In all configurations the shape is within `reach` of the hull of `points`, which are
+        # fixed in the frame of `joint`.
         axis, slide = _axis_and_slide(model, joint)
         across = points - np.outer(points @ axis, axis)
-        levers[model.joints[joint].idx_v] = (
-            1.0 if slide else reach + radius + np.linalg.norm(across, axis=1).max()
-        )
-        reach += radius + float(np.linalg.norm(points, axis=1).max())
+        farthest = reach + float(np.linalg.norm(across, axis=1).max())
+        levers[model.joints[joint].idx_v] = 1.0 if slide else farthest
+        reach += float(np.linalg.norm(points, axis=1).max())
         reach += _extension(model, joint) if slide else 0.0
-        radius = 0.0
         points = model.jointPlacements[joint].translation[np.newaxis]
         joint = model.parents[joint]
     return levers

@@ -6,6 +6,7 @@ from enum import StrEnum
 import numpy as np
 
 from densarm.arrays import Array
+from densarm.bisection import bisect
 from densarm.swept_bound import SweptBound
 
 
@@ -36,17 +37,20 @@ class SweptResult:
 class SweptCheck:
     """Proves a sampled motion clear by bisection over arcs of it.
 
-    An arc from sample a to sample b moves a pair's bodies by at most μ = Σ_j r_j s_j, s_j the
-    summed |Δq_j| along it and what the true motion departs from the chords. The pair is apart on
-    all of the arc if d(q_a) + d(q_b) > μ; else the arc is halved, down to parts of one chord.
+    On an arc from a to b of the polyline through the samples the bodies of pair k move against
+    each other by at most Σ_j r_kj s_j, s_j the summed |Δq_j|. The true motion departs from a chord
+    by at most δ_j, none at its ends, so that the pair is apart on all of the arc if
+
+        d_k(q_a) + d_k(q_b) > Σ_j r_kj (s_j + 2 max δ_j);
+
+    else the arc is halved, first at samples, then within chords.
 
     Args:
-        bound: the bound r_j and the margin to be kept.
+        bound: the bound r_kj and the margin to be kept.
     """
 
     def __init__(self, bound: SweptBound) -> None:
         self._bound = bound
-        self._arm = bound.arm
 
     def check(self, q: Array, departure: Array | None = None) -> SweptResult:
         """Return whether the motion through samples is proved clear.
@@ -56,38 +60,50 @@ class SweptCheck:
             departure: bound on how far the motion departs from each segment, per joint
                 (N - 1, nv) [rad or m]; None for zero.
         """
-        steps = np.abs(self._arm.difference(q[:-1], q[1:]))
-        if departure is not None:
-            # A point that departs from its chord is that much farther from both of its ends.
-            steps = steps + 2.0 * departure
-        travelled = np.vstack([np.zeros(self._arm.nv), np.cumsum(steps, axis=0)])
-        slack = {k: self._bound.slack(q[k]) for k in {0, len(q) - 1}}
-        arcs = [(0, len(q) - 1)]
-        while arcs:
-            a, b = arcs.pop()
-            for end in (a, b):
-                if (slack[end] <= 0.0).any():
-                    return self._failure(SweptVerdict.CONTACT, end, slack[end] <= 0.0, len(slack))
-            near = slack[a] + slack[b] <= self._bound.motion(travelled[b] - travelled[a])
-            if not near.any():
-                continue
-            if b - a > 1:
-                middle = (a + b) // 2
-                slack[middle] = self._bound.slack(q[middle])
-                arcs += [(middle, b), (a, middle)]
-            elif not self._chord_is_clear(q[a], q[b], None if departure is None else departure[a]):
-                return self._failure(SweptVerdict.UNDECIDED, a, near, len(slack))
-        return SweptResult(SweptVerdict.CLEAR, -1, (), len(slack))
+        clearance = self._bound.clearance
+        polyline = _Polyline(self._bound, q, departure)
+        result = bisect(
+            slack=lambda t, pairs: self._bound.slack(polyline.configuration(t), pairs),
+            motion=lambda a, b, pairs: self._bound.motion(polyline.travel(a, b), pairs),
+            split=polyline.split,
+            ends=(0, len(q) - 1),
+            n_pairs=clearance.n_pairs,
+        )
+        evaluations = len(result.evaluated)
+        if not len(result.failing):
+            return SweptResult(SweptVerdict.CLEAR, -1, (), evaluations)
+        verdict = SweptVerdict.CONTACT if result.in_contact else SweptVerdict.UNDECIDED
+        pairs = tuple(clearance.pairs[k] for k in result.failing)
+        return SweptResult(verdict, int(result.failed_at), pairs, evaluations)
 
-    def _chord_is_clear(self, q_a: Array, q_b: Array, departure: Array | None) -> bool:
-        """Decide one chord by bisection; departing bodies come nearer by what they depart."""
-        if departure is None:
-            return self._bound.segment_is_clear(q_a, q_b)
-        extra = float(self._bound.motion(departure).max(initial=0.0))
-        return self._bound.with_margin(self._bound.margin + extra).segment_is_clear(q_a, q_b)
 
-    def _failure(
-        self, verdict: SweptVerdict, index: int, failing: Array, evaluations: int
-    ) -> SweptResult:
-        pairs = tuple(self._bound.clearance.pairs[k] for k in np.flatnonzero(failing))
-        return SweptResult(verdict, int(index), pairs, evaluations)
+class _Polyline:
+    """The polyline through samples, its parameter t the index of a sample plus a fraction."""
+
+    def __init__(self, bound: SweptBound, q: Array, departure: Array | None) -> None:
+        self._arm, self._floor = bound.arm, bound.DEPTH_FLOOR
+        self._q = q
+        self._step = self._arm.difference(q[:-1], q[1:])
+        self._departure = np.zeros_like(self._step) if departure is None else departure
+        length = np.cumsum(np.abs(self._step), axis=0)
+        self._length = np.vstack([np.zeros(self._arm.nv), length])
+
+    def configuration(self, t: float) -> Array:
+        k = int(t)
+        return self._q[k] if k == t else self._arm.integrate(self._q[k], (t - k) * self._step[k])
+
+    def travel(self, a: float, b: float) -> Array:
+        """Return the bound s_j + 2 max δ_j (nv,) on the motion of the joints from a to b."""
+        departure = self._departure[int(a) : int(np.ceil(b))].max(axis=0, initial=0.0)
+        return np.asarray(self._length_at(b) - self._length_at(a) + 2.0 * departure)
+
+    def split(self, a: float, b: float) -> float | None:
+        if b - a > 1:
+            return (a + b) // 2
+        longest = float(np.abs(self._step[int(a)]).max()) * (b - a) if b > a else 0.0
+        return 0.5 * (a + b) if longest > self._floor else None
+
+    def _length_at(self, t: float) -> Array:
+        k = int(t)
+        part = 0.0 if k == t else (t - k) * np.abs(self._step[k])
+        return np.asarray(self._length[k] + part)

@@ -1,4 +1,4 @@
-"""Tables: a dataclass from the plain data of a TOML or JSON table, with errors that name the key."""
+"""Tables: a dataclass from the plain data of a TOML or JSON table; errors name the key."""
 
 import json
 from collections.abc import Mapping
@@ -41,7 +41,7 @@ def _first_error(name: str, error: ValidationError) -> InvalidValueError:
     first = error.errors()[0]
     own = first.get("ctx", {}).get("error")
     if isinstance(own, InvalidValueError):
-        return own
+        return InvalidValueError(f"{name}.{own.name}", own.value, own.allowed)
     key = ".".join([name, *(str(part) for part in first["loc"][:1])])
     message = first["msg"].removeprefix("Input should be ").removeprefix("Value error, ")
     return InvalidValueError(key, first["input"], message)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import zlib
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -107,23 +108,24 @@ class Trajectory:
             DensarmError: its scenario cannot be rebuilt, e.g. since a mesh has changed.
         """
         try:
-            with np.load(path, allow_pickle=False) as data:
+            with Path(path).open("rb") as file, np.load(file, allow_pickle=False) as data:
                 arrays = {name: np.asarray(data[name], dtype=np.float64) for name in _ARRAYS}
                 scenario = json.loads(str(data["scenario"]))
                 result = json.loads(str(data["result"]))
+            deviation = result["tracking_error_rad"]
             return cls(
                 scenario=Scenario.from_json(scenario),
                 **arrays,
                 outcome=Outcome(result["outcome"]),
                 detail=str(result["detail"]),
                 plan_time=float(result["plan_time_s"]),
-                tracking_error=result["tracking_error_rad"],
+                tracking_error=None if deviation is None else float(deviation),
             )._checked()
         except OSError as error:
             raise FileContentError(path, error.strerror or "not a run: not a .npz file") from None
         except DensarmError as error:
             raise FileContentError(path, f"not a run: {error}") from None
-        except (ValueError, KeyError, TypeError, EOFError, BadZipFile) as error:
+        except (ValueError, KeyError, TypeError, AttributeError, EOFError, *_DAMAGE) as error:
             raise FileContentError(path, f"not a run: {' '.join(str(error).split())}") from None
 
     def _checked(self) -> Trajectory:
@@ -133,9 +135,13 @@ class Trajectory:
             array = getattr(self, name)
             if array.shape != shape or n == 0:
                 raise DensarmError(f"{name} has shape {array.shape}, expected {shape}")
-            if name != "clearance" and not np.isfinite(array).all():
+            if np.isnan(array).any() or (name != "clearance" and np.isinf(array).any()):
                 raise DensarmError(f"{name} has entries that are not finite")
+        if np.abs(arm.configurations(arm.angles(self.q)) - self.q).max() > _UNIT_TOLERANCE:
+            raise DensarmError("q has a (cos, sin) pair that is not of length one")
         return self
 
 
+_UNIT_TOLERANCE = 1e-6
+_DAMAGE = (BadZipFile, zlib.error, NotImplementedError)  # what reading a damaged archive raises
 _ARRAYS = ("time", "q", "v", "tau", "clearance")

@@ -1,6 +1,7 @@
 """Checks of values at construction, each raising one `InvalidValueError`."""
 
 from collections.abc import Collection
+from numbers import Real
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -21,10 +22,9 @@ def finite_vector(name: str, value: ArrayLike, length: int, hint: str = "") -> A
     Raises:
         InvalidValueError: a wrong shape (expected and got), or an entry that is not finite.
     """
-    try:
-        vector = np.array(value, dtype=np.float64)
-    except (TypeError, ValueError):
-        raise InvalidValueError(name, value, f"{length} numbers") from None
+    vector = _array_of_numbers(value)
+    if vector is None:
+        raise InvalidValueError(name, value, f"{length} numbers")
     if vector.shape != (length,):
         shape = f"of shape ({length},), got {vector.shape}{hint}"
         raise InvalidValueError(name, value, shape)
@@ -36,6 +36,20 @@ def finite_vector(name: str, value: ArrayLike, length: int, hint: str = "") -> A
 def finite_tuple(name: str, value: ArrayLike, length: int) -> tuple[float, ...]:
     """Return `value` as a tuple of `length` finite floats; errors as `finite_vector`."""
     return tuple(finite_vector(name, value, length).tolist())
+
+
+def unit_quaternion(name: str, value: ArrayLike) -> tuple[float, ...]:
+    """Return the quaternion x y z w, of a length within 1 % of one, scaled to one.
+
+    Raises:
+        InvalidValueError: a wrong shape, an entry that is not finite, or another length.
+    """
+    quaternion = finite_vector(name, value, 4)
+    norm = float(np.linalg.norm(quaternion))
+    if abs(norm - 1.0) > 0.01:
+        raise InvalidValueError(name, value, "a unit quaternion x y z w")
+    # Scaling once more would change the last digit of what is already of unit length.
+    return tuple((quaternion / norm if abs(norm - 1.0) > 1e-12 else quaternion).tolist())
 
 
 def positive(name: str, value: float) -> float:
@@ -59,6 +73,13 @@ def positive_integer(name: str, value: int) -> int:
     return int(value)
 
 
+def non_negative_integer(name: str, value: int) -> int:
+    """Return `value` if it is an integer, zero or above, else raise InvalidValueError."""
+    if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < 0:
+        raise InvalidValueError(name, value, "an integer >= 0")
+    return int(value)
+
+
 def one_of(name: str, value: str, allowed: Collection[str]) -> str:
     """Return `value` if it is among `allowed`, else raise InvalidValueError."""
     if value not in allowed:
@@ -67,4 +88,12 @@ def one_of(name: str, value: str, allowed: Collection[str]) -> str:
 
 
 def _is_number(value: object) -> bool:
-    return isinstance(value, int | float | np.number) and not isinstance(value, bool)
+    return isinstance(value, Real) and not isinstance(value, bool)
+
+
+def _array_of_numbers(value: ArrayLike) -> Array | None:
+    try:
+        array = np.asarray(value)
+    except (TypeError, ValueError):  # rows of different lengths
+        return None
+    return array.astype(np.float64) if array.dtype.kind in "iuf" else None

@@ -24,3 +24,9 @@ def chromium() -> str:
         missing = pytest.fail if os.environ.get("DENSARM_REQUIRE_BROWSER") else pytest.skip
         missing("no Chromium: apt-get install chromium")
     return path
+
+
+@pytest.fixture(scope="session")
+def swing_up_run() -> "densarm.Trajectory":
+    """A certified run of swing_up."""
+    return densarm.simulate(densarm.load_scenario("swing_up"))

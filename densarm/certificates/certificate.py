@@ -10,7 +10,6 @@ from densarm.certificates.replay import REPLAY_TOLERANCE, replay_error
 from densarm.clearance import Clearance
 from densarm.scenario import Scenario
 from densarm.simulation.fixed_step_loop import REACHED_POSITION, REACHED_VELOCITY
-from densarm.simulation.plant import Integrator
 from densarm.swept_bound import SweptBound
 from densarm.swept_check import SweptCheck, SweptResult, SweptVerdict
 
@@ -52,14 +51,13 @@ def certify(scenario: Scenario, time: Array, q: Array, v: Array, tau: Array) -> 
         v: velocities (N, nv) [rad/s or m/s].
         tau: torque held from each sample to the next (N, nv) [N·m or N].
     """
-    arm, dt = scenario.arm, scenario.simulation.dt
     return Certificate(
         (
-            _swept(arm, scenario, q, v, dt),
-            _start(arm, scenario, q, v, time, dt),
-            _goal(arm, scenario, q, v),
-            _limits(arm, q, v, tau),
-            _replay(arm, scenario, q, v, tau),
+            _swept(scenario, q, v),
+            _start(scenario, q, v, time),
+            _goal(scenario, q, v),
+            _limits(scenario.arm, q, v, tau),
+            _replay(scenario, q, v, tau),
         )
     )
 
@@ -83,26 +81,26 @@ def swept_result(scenario: Scenario, q: Array, v: Array) -> SweptResult:
     return SweptCheck(bound).check(q, around * dt**2 / 8.0)
 
 
-def _swept(arm: Arm, scenario: Scenario, q: Array, v: Array, dt: float) -> Check:
+def _swept(scenario: Scenario, q: Array, v: Array) -> Check:
     result = swept_result(scenario, q, v)
     if result.verdict == SweptVerdict.CLEAR:
         return Check("swept", True, f"proved clear from {result.evaluations} configurations")
+    at = result.index * scenario.simulation.dt
     pairs = ", ".join(f"{a}-{b}" for a, b in result.pairs[:3])
-    return Check("swept", False, f"{result.verdict} at t = {result.index * dt:.3f} s: {pairs}")
+    return Check("swept", False, f"{result.verdict} at t = {at:.3f} s: {pairs}")
 
 
-def _start(
-    arm: Arm, scenario: Scenario, q: Array, v: Array, time: Array, dt: float
-) -> Check:
-    error = float(np.abs(arm.difference(scenario.start_configuration, q[0])).max())
+def _start(scenario: Scenario, q: Array, v: Array, time: Array) -> Check:
+    error = float(np.abs(scenario.arm.difference(scenario.start_configuration, q[0])).max())
     speed = float(np.abs(v[0]).max())
-    regular = float(np.abs(time - dt * np.arange(len(time))).max())
-    holds = error <= _ROUNDING and speed == 0.0 and regular <= _ROUNDING
-    return Check("start", holds, f"{error:.2g} from the start at {speed:.2g} rad/s")
+    shift = float(np.abs(time - scenario.simulation.dt * np.arange(len(time))).max())
+    holds = error <= _ROUNDING and speed == 0.0 and shift <= _ROUNDING
+    detail = f"{error:.2g} from the start at {speed:.2g} rad/s, {shift:.2g} s off the time grid"
+    return Check("start", holds, detail)
 
 
-def _goal(arm: Arm, scenario: Scenario, q: Array, v: Array) -> Check:
-    error = float(np.abs(arm.difference(scenario.goal_configuration, q[-1])).max())
+def _goal(scenario: Scenario, q: Array, v: Array) -> Check:
+    error = float(np.abs(scenario.arm.difference(scenario.goal_configuration, q[-1])).max())
     speed = float(np.abs(v[-1]).max())
     holds = error <= REACHED_POSITION and speed <= REACHED_VELOCITY
     return Check("goal", holds, f"ends {error:.2g} from the goal at {speed:.2g} rad/s")
@@ -120,7 +118,7 @@ def _limits(arm: Arm, q: Array, v: Array, tau: Array) -> Check:
     return Check("limits", bool(holds), f"peaks: {', '.join(parts)} of the limits")
 
 
-def _replay(arm: Arm, scenario: Scenario, q: Array, v: Array, tau: Array) -> Check:
+def _replay(scenario: Scenario, q: Array, v: Array, tau: Array) -> Check:
     simulation = scenario.simulation
-    error = replay_error(arm, simulation.dt, Integrator(simulation.integrator), q, v, tau)
+    error = replay_error(scenario.arm, simulation.dt, simulation.integrator, q, v, tau)
     return Check("replay", error <= REPLAY_TOLERANCE, f"one-step replay within {error:.1g}")

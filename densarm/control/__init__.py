@@ -1,1 +1,1 @@
-"""control"""
+"""Controllers: joint torque from time and state."""

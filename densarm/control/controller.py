@@ -1,13 +1,17 @@
 """Controller: joint torque from time and state."""
 
+import math
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from densarm.arm import Arm
 from densarm.arrays import Array
+from densarm.compiled import compiled
 from densarm.validation import finite_vector
+
+_UNIT_TOLERANCE = 1e-6  # of cos² + sin² of a continuous joint
 
 
 class Controller(Protocol):
@@ -32,7 +36,23 @@ class Controller(Protocol):
 
 def checked_state(arm: Arm, q: ArrayLike, v: ArrayLike) -> tuple[Array, Array]:
     """Return q (nq,) and v (nv,) as float arrays; errors as `Controller.torque`."""
-    q, v = np.asarray(q, dtype=np.float64), np.asarray(v, dtype=np.float64)
-    if q.shape == (arm.nq,) and v.shape == (arm.nv,) and np.isfinite(q @ q + v @ v):
+    q = np.ascontiguousarray(q, dtype=np.float64)
+    v = np.ascontiguousarray(v, dtype=np.float64)
+    if _is_state(q, v, arm.nq, arm.idx_q, arm.is_circle):
         return q, v
     return arm.check_configuration("configuration", q), finite_vector("velocity", v, arm.nv)
+
+
+@compiled
+def _is_state(
+    q: Array, v: Array, nq: int, idx_q: NDArray[np.int64], is_circle: NDArray[np.bool_]
+) -> bool:
+    if q.size != nq or v.size != idx_q.size or q.ndim != 1 or v.ndim != 1:
+        return False
+    for i in range(v.size):
+        x = q[idx_q[i]]
+        if not (math.isfinite(v[i]) and math.isfinite(x)):
+            return False
+        if is_circle[i] and not abs(x * x + q[idx_q[i] + 1] ** 2 - 1.0) < _UNIT_TOLERANCE:
+            return False
+    return True

@@ -1,5 +1,6 @@
 """DensityFeedback: the plain law u = ∇ρ + d(q, q̇)."""
 
+import numpy as np
 from numpy.typing import ArrayLike
 
 from densarm.arm import Arm
@@ -48,5 +49,5 @@ class DensityFeedback:
         attract = self._gain * self._field.update(q, metric)
         distance = self._field.guided.clearance.distance
         if self._field.speed_law.must_brake(v, distance, 2.0 * self._period):
-            attract[:] = 0.0
+            return self._dynamics.torque(-v / self._period, np.zeros_like(v))
         return self._dynamics.torque(-self._gain * v, attract)

@@ -1,5 +1,6 @@
 """DensityRegulation: the density inverse-dynamics controller towards a constant goal."""
 
+import numpy as np
 from numpy.typing import ArrayLike
 
 from densarm.arm import Arm
@@ -42,5 +43,5 @@ class DensityRegulation:
         self._dynamics.update(q, v)
         distance = self._field.guided.clearance.distance
         if self._field.speed_law.must_brake(v, distance, 2.0 * self._period):
-            attract[:] = 0.0
+            return self._dynamics.torque(-v / self._period, np.zeros_like(v))
         return self._dynamics.torque(-self._gain * v, attract)

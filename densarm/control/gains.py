@@ -24,5 +24,5 @@ class Gains:
         return self.position / self.velocity
 
     def __post_init__(self) -> None:
-        positive("gains.position", self.position)
-        positive("gains.velocity", self.velocity)
+        positive("position", self.position)
+        positive("velocity", self.velocity)

@@ -52,9 +52,7 @@ class InverseDynamics:
 
 
 @compiled
-def _shares(
-    offset: Array, brake: Array, attract: Array, limit: Array
-) -> tuple[float, float]:
+def _shares(offset: Array, brake: Array, attract: Array, limit: Array) -> tuple[float, float]:
     """Return (γ, β) that keep |offset + γ brake + β attract| ≤ limit, as the class says."""
     low, high = 0.0, 1.0
     for i in range(limit.shape[0]):

@@ -67,47 +67,12 @@ def log_inverse_bump(h: float, width: float, theta: float) -> tuple[float, float
 
 @compiled
 def accumulate_log_bumps(
-    h: Array,
+    distance: Array,
+    margin: float,
     h_gradient: Array,
     width: Array,
-    width_gradient: Array,
     theta: float,
     out_gradient: Array,
-) -> float:
-    r"""Sum ln Ψ over unsafe sets and add the gradient of the sum in place.
-
-    .. math::
-
-        \sum_k \ln\Psi_k, \qquad
-        \sum_k \frac{\partial \ln\Psi_k}{\partial h_k} (\nabla h_k - t_k \nabla w_k)
-
-    Args:
-        h: values h_k, shape (K,).
-        h_gradient: ∇h_k, shape (K, nv).
-        width: w_k = h_k − s_k, shape (K,), in the unit of `h`.
-        width_gradient: ∇w_k, shape (K, nv).
-        theta: shift θ ≥ 0, dimensionless.
-        out_gradient: shape (nv,), added to.
-
-    Returns:
-        Σ ln Ψ_k.
-
-    Source: [ZNV] eq. 7-8.
-    """
-    total = 0.0
-    for k in range(h.shape[0]):
-        value, slope = log_inverse_bump(h[k], width[k], theta)
-        total += value
-        if slope != 0.0:
-            t = max(h[k] / width[k], 0.0)
-            for i in range(out_gradient.shape[0]):
-                out_gradient[i] += slope * (h_gradient[k, i] - t * width_gradient[k, i])
-    return total
-
-
-@compiled
-def accumulate_uniform_log_bumps(
-    h: Array, h_gradient: Array, width: Array, theta: float, out_gradient: Array
 ) -> float:
     r"""Sum ln Ψ over unsafe sets with s_k = h_k − σ_k; add the gradient of the sum in place.
 
@@ -116,9 +81,10 @@ def accumulate_uniform_log_bumps(
         \sum_k \ln\Psi_k, \qquad \sum_k \frac{\partial \ln\Psi_k}{\partial h_k} \nabla h_k
 
     Args:
-        h: values h_k, shape (K,).
+        distance: values d_k, shape (K,).
+        margin: m, in the unit of `distance`.
         h_gradient: ∇h_k, shape (K, nv).
-        width: sensing distances σ_k > 0, shape (K,), in the unit of `h`.
+        width: sensing distances σ_k > 0, shape (K,), in the unit of `distance`.
         theta: shift θ ≥ 0, dimensionless.
         out_gradient: shape (nv,), added to.
 
@@ -128,8 +94,8 @@ def accumulate_uniform_log_bumps(
     Source: [ZNV] eq. 7-8.
     """
     total = 0.0
-    for k in range(h.shape[0]):
-        value, slope = log_inverse_bump(h[k], width[k], theta)
+    for k in range(distance.shape[0]):
+        value, slope = log_inverse_bump(distance[k] - margin, width[k], theta)
         total += value
         if slope != 0.0:
             for i in range(out_gradient.shape[0]):

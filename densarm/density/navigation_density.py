@@ -6,6 +6,7 @@ import math
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Generic, TypeVar
 
 import numpy as np
 
@@ -16,6 +17,8 @@ from densarm.density.goal_distance import GoalDistance
 from densarm.density.smooth_step import smooth_step
 from densarm.density.unsafe_set import UnsafeSet
 from densarm.validation import non_negative, one_of, positive
+
+V = TypeVar("V", bound=GoalDistance)
 
 LOG_SATURATION = math.log(1e150)
 """Entries of a gradient are held below 1e150 in magnitude, so that its norm is a double too."""
@@ -120,7 +123,8 @@ class DensitySample:
             self.goal_distance,
             self.goal_distance_gradient,
             self.parameters.alpha,
-            _log_scale(gauge, self.log_psi, self.goal_distance, self.parameters.alpha),
+            self.log_psi,
+            *_exponents(gauge, self.parameters.alpha),
             out,
         )
         return out
@@ -146,7 +150,7 @@ class DensitySample:
         return (1.0 - share) * gradient - share * self.goal_error
 
 
-class NavigationDensity:
+class NavigationDensity(Generic[V]):
     r"""The density of where an arm may spend its time.
 
     .. math:: \rho(q) = \frac{\prod_k \Psi_k(q)}{V(q)^\alpha}
@@ -168,12 +172,13 @@ class NavigationDensity:
     def __init__(
         self,
         unsafe_sets: Sequence[UnsafeSet],
-        goal_distance: GoalDistance,
+        goal_distance: V,
         parameters: DensityParameters = DensityParameters(),
     ) -> None:
         self.unsafe_sets = tuple(unsafe_sets)
         self.goal_distance = goal_distance
         self.parameters = parameters
+        self._exponents = {gauge: _exponents(gauge, parameters.alpha) for gauge in Gauge}
         self.log_psi = 0.0
         self.log_psi_gradient: Array = np.zeros_like(goal_distance.error(goal_distance.goal))
         self.goal_distance_value = 0.0
@@ -190,10 +195,15 @@ class NavigationDensity:
 
     def write_gradient(self, gauge: Gauge, out: Array) -> None:
         """Write `DensitySample.gradient` at the last `update` into `out`, shape (nv,)."""
-        alpha, value = self.parameters.alpha, self.goal_distance_value
-        log_scale = _log_scale(gauge, self.log_psi, value, alpha)
-        gradient = self.goal_distance_gradient
-        _write_gradient(self.log_psi_gradient, value, gradient, alpha, log_scale, out)
+        _write_gradient(
+            self.log_psi_gradient,
+            self.goal_distance_value,
+            self.goal_distance_gradient,
+            self.parameters.alpha,
+            self.log_psi,
+            *self._exponents[gauge],
+            out,
+        )
 
     def evaluate(self, q: Array) -> DensitySample:
         """Return the density and its parts at `q`, shape (nq,)."""
@@ -208,13 +218,13 @@ class NavigationDensity:
         )
 
 
-def _log_scale(gauge: Gauge, log_psi: float, goal_distance: float, alpha: float) -> float:
-    log_distance = math.log(max(goal_distance, V_MIN))
-    if gauge == Gauge.DENSITY:
-        return log_psi - (alpha + 1.0) * log_distance
-    if gauge == Gauge.LOG:
-        return -log_distance
-    return (alpha - 1.0) * log_distance - log_psi
+_ALPHA_SHARE = {Gauge.DENSITY: -1.0, Gauge.LOG: 0.0, Gauge.RECIPROCAL: 1.0}
+
+
+def _exponents(gauge: Gauge, alpha: float) -> tuple[float, float]:
+    """Return the exponents of V and of Ψ in the factor by which a gauge's gradient is not w."""
+    share = _ALPHA_SHARE[gauge]
+    return share * alpha - 1.0, -share
 
 
 @compiled
@@ -223,7 +233,9 @@ def _write_gradient(
     goal_distance: float,
     goal_distance_gradient: Array,
     alpha: float,
-    log_scale: float,
+    log_psi: float,
+    distance_exponent: float,
+    psi_exponent: float,
     out: Array,
 ) -> None:
     largest = 0.0
@@ -231,6 +243,9 @@ def _write_gradient(
         out[i] = goal_distance * log_psi_gradient[i] - alpha * goal_distance_gradient[i]
         largest = max(largest, abs(out[i]))
     if largest > 0.0:
+        log_scale = distance_exponent * math.log(max(goal_distance, V_MIN))
+        if psi_exponent != 0.0:  # ln Ψ is infinite in contact
+            log_scale += psi_exponent * log_psi
         scale = math.exp(min(log_scale + math.log(largest), LOG_SATURATION))
         for i in range(out.shape[0]):
             out[i] = out[i] / largest * scale

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from densarm.arrays import Array
 from densarm.compiled import compiled
-from densarm.density.inverse_bump import accumulate_uniform_log_bumps, log_inverse_bump
+from densarm.density.inverse_bump import accumulate_log_bumps, log_inverse_bump
 from densarm.errors import InvalidValueError
 from densarm.validation import non_negative, positive
 
@@ -64,14 +64,18 @@ class ClearanceSet:
         self.sensing_distance = _positive_array(
             "sensing_distance", sensing_distance, clearance.distance.shape[0]
         )
-        self._h = np.empty_like(self.sensing_distance)
 
     def add_log_bump(self, q: Array, theta: float, out_gradient: Array) -> float:
         """Update the clearance to `q`, then act as `UnsafeSet.add_log_bump`."""
-        self.clearance.update(q)
-        np.subtract(self.clearance.distance, self.margin, out=self._h)
-        return accumulate_uniform_log_bumps(
-            self._h, self.clearance.gradient, self.sensing_distance, theta, out_gradient
+        clearance = self.clearance
+        clearance.update(q)
+        return accumulate_log_bumps(
+            clearance.distance,
+            self.margin,
+            clearance.gradient,
+            self.sensing_distance,
+            theta,
+            out_gradient,
         )
 
 

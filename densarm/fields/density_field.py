@@ -39,14 +39,13 @@ class DensityField:
             k (nv,) [rad/s or m/s]; zero at a critical point.
         """
         guided = self.guided
-        guided.density.update(q)
-        guided.advance(q)
+        guided.update(q)
         if guided.is_critical():
             return np.zeros_like(self._gradient)
-        guided.write_gradient(self._gradient)
-        velocity = self._rate * (
-            self._gradient if metric is None else np.linalg.solve(metric, self._gradient)
-        )
+        guided.write_gradient(q, self._gradient)
+        velocity = self._rate * self._gradient
+        if metric is not None:
+            velocity = np.asarray(np.linalg.solve(metric, velocity), dtype=np.float64)
         norm = float(np.sqrt(velocity @ velocity))
         way = guided.way_left(q)
         speed = self.speed_law.speed(velocity / norm, guided.clearance.distance, way)

@@ -60,20 +60,19 @@ class GuidedDensity:
         self.chain.current = 1
         self._point_at_sub_goal()
 
-    def advance(self, q: Array) -> bool:
-        """Move on along the chain, from the distances of the density's last update at q (nq,).
-
-        Returns:
-            Whether the sub-goal changed.
-        """
-        changed = self.chain.advance(q, self.clearance.distance)
-        if changed:
+    def update(self, q: Array) -> None:
+        """Move on to the farthest sub-goal in sight of q (nq,) and evaluate its density there."""
+        self.density.update(q)
+        if self.chain.advance(q, self.clearance.distance):
             self._point_at_sub_goal()
-        return changed
+            self.density.update(q)
 
-    def write_gradient(self, out: Array) -> None:
-        """Write ∇ρ (nv,) of the last update in the density's own gauge into `out`."""
-        self.density.write_gradient(self.density.parameters.gauge, out)
+    def write_gradient(self, q: Array, out: Array) -> None:
+        """Write ∇ρ (nv,) in the density's own gauge and blend into `out`; q (nq,) was updated."""
+        if self.density.parameters.blend_radius > 0.0:
+            out[:] = self.density.evaluate(q).blended_gradient()
+        else:
+            self.density.write_gradient(self.density.parameters.gauge, out)
 
     def slope(self) -> float:
         """Return ‖∇ ln ρ‖ at the last update [1/rad]."""
@@ -88,6 +87,17 @@ class GuidedDensity:
         """Return the length of the way from q (nq,) by the sub-goals to the goal [rad]."""
         to_sub_goal = float(np.linalg.norm(self.goal_distance.error(q)))
         return to_sub_goal + float(self.chain.remaining[self.chain.current])
+
+    def describe_stall(self, q: Array) -> str:
+        """Return, as a phrase, why the density leads nowhere from q (nq,), and what blocks it."""
+        self.density.update(q)
+        kind = "critical point of" if self.is_critical() else "no ascent along"
+        where = ", ".join(f"{angle:.4g}" for angle in self.clearance.arm.angles(q))
+        blocking = [" and ".join(pair) for pair in self.blocking_pairs()[:5]]
+        return (
+            f"{kind} the density at joint positions ({where}), where |grad ln rho| = "
+            f"{self.slope():.2g}; sensed there: {', '.join(blocking) or 'no pair'}"
+        )
 
     def blocking_pairs(self) -> list[tuple[str, str]]:
         """Return the pairs inside their sensing regions at the last update, nearest first."""

@@ -53,26 +53,24 @@ class PlanningSystem:
 
     def integrate(self, start: Array) -> PlannedCurve:
         """Return the curve from a collision-free start (nq,)."""
-        guided, arm = self._guided, self._arm
+        guided = self._guided
         guided.restart()
         goal, points = guided.chain.q[-1], [start]
         q = start
-        self._density.update(q)
         for _ in range(self.MAX_STEPS):
-            if guided.advance(q):
-                self._density.update(q)
+            guided.update(q)
             error = guided.goal_distance.error(q)
             if guided.chain.is_last and np.abs(error).max() <= self.SMALLEST_STEP:
                 return PlannedCurve(np.array([*points[:-1], goal]), reached=True, detail="")
             q_next = self._climb(q, float(np.linalg.norm(error)))
             if q_next is None:
-                return self._stuck(points)
+                break
             q = q_next
             points.append(q)
-        return self._stuck(points)
+        return PlannedCurve(np.array(points), reached=False, detail=guided.describe_stall(q))
 
     def _climb(self, q: Array, distance_left: float) -> Array | None:
-        """Return the next point, with the density updated there, or None where ρ has no slope."""
+        """Return the next point, or None where ρ has no slope."""
         if self._guided.is_critical():
             return None
         self._density.write_gradient(Gauge.LOG, self._gradient)
@@ -85,7 +83,6 @@ class PlanningSystem:
             if self._log_density() > before:
                 return candidate
             length *= 0.5
-        self._density.update(q)
         return None
 
     def _clear_length(self, direction: Array) -> float:
@@ -98,15 +95,3 @@ class PlanningSystem:
         density = self._density
         log_distance = np.log(max(density.goal_distance_value, 1e-300))
         return float(density.log_psi - density.parameters.alpha * log_distance)
-
-    def _stuck(self, points: list[Array]) -> PlannedCurve:
-        q = points[-1]
-        self._density.update(q)
-        blocking = [" and ".join(pair) for pair in self._guided.blocking_pairs()[:5]]
-        where = ", ".join(f"{angle:.4g}" for angle in self._arm.angles(q))
-        kind = "critical point of" if self._guided.is_critical() else "no ascent along"
-        detail = (
-            f"{kind} the density at joint positions ({where}), where |grad ln rho| = "
-            f"{self._guided.slope():.2g}; sensed there: {', '.join(blocking) or 'no pair'}"
-        )
-        return PlannedCurve(np.array(points), reached=False, detail=detail)

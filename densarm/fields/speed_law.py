@@ -1,5 +1,6 @@
 """SpeedLaw: how fast the arm may go along a direction and still stop in the free space ahead."""
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -23,7 +24,7 @@ class SpeedParameters:
 
     def __post_init__(self) -> None:
         if not 0.0 < self.braking_share <= 1.0:
-            raise InvalidValueError("speed.braking_share", self.braking_share, "in (0, 1]")
+            raise InvalidValueError("braking_share", self.braking_share, "in (0, 1]")
 
 
 class SpeedLaw:
@@ -57,15 +58,17 @@ class SpeedLaw:
             distance: signed distances of all pairs (K,) [m].
             way_left: length ℓ of the way to the goal [rad].
         """
-        return _speed(
-            direction,
-            distance,
-            self._margin,
-            self._lever,
-            self._limits.velocity,
-            self._limits.acceleration,
-            way_left,
-            self._parameters.braking_share,
+        return float(
+            _speed(
+                direction,
+                distance,
+                self._margin,
+                self._lever,
+                self._limits.velocity,
+                self._limits.acceleration,
+                way_left,
+                self._parameters.braking_share,
+            )
         )
 
     def must_brake(self, v: Array, distance: Array, reaction: float) -> bool:
@@ -105,7 +108,7 @@ def _speed(
             rate += lever[k, j] * abs(direction[j])
         if rate > 0.0:
             room = min(room, max(distance[k] - margin, 0.0) / rate)
-    return min(speed, np.sqrt(2.0 * braking * room))
+    return min(speed, math.sqrt(2.0 * braking * room))
 
 
 @compiled

@@ -1,4 +1,4 @@
-"""SubGoalChain: the sub-goals of a guide, close enough to follow, each with its sensing distance."""
+"""SubGoalChain: the sub-goals of a guide, close enough to follow, and their sensing distances."""
 
 from dataclasses import dataclass
 
@@ -12,7 +12,10 @@ from densarm.swept_bound import SweptBound
 from densarm.validation import positive
 
 _SURPLUS = 3.0
-"""Factor by which neighbours are closer than a proof needs, so that an arm near one sees the next."""
+"""Factor by which neighbours are closer than a proof needs: an arm near one sees the next."""
+
+_LARGEST_SHARE = 0.5
+"""Below 1 - 1/_SURPLUS, or neighbours would be out of sight of each other."""
 
 
 @dataclass(frozen=True)
@@ -26,27 +29,32 @@ class SensingParameters:
     distance: float = 0.05
     """Largest sensing distance σ of a geometry pair [m]."""
 
-    path_share: float = 0.45
-    """σ is at most this share of the path's own clearance, below 1; from Ψ = 1 on the path."""
+    path_share: float = 0.3
+    """σ is at most this share of the path's own clearance, so that Ψ = 1 on the path."""
 
     joint: float = 0.1
     """Largest sensing distance of a joint limit [rad or m]."""
 
     def __post_init__(self) -> None:
-        positive("sensing.distance", self.distance)
-        positive("sensing.joint", self.joint)
-        if not 0.0 < self.path_share < 1.0:
-            raise InvalidValueError("sensing.path_share", self.path_share, "between 0 and 1")
+        positive("distance", self.distance)
+        positive("joint", self.joint)
+        if not 0.0 < self.path_share <= _LARGEST_SHARE:
+            allowed = f"above 0 and at most {_LARGEST_SHARE}"
+            raise InvalidValueError("path_share", self.path_share, allowed)
 
 
 class SubGoalChain:
     """Sub-goals from start to goal and the one that is current.
 
-    A path is cut so finely that from each sub-goal the next is in sight: the bound proves the
-    segment between them clear, with at least half of an end's clearance left on all of it. The
-    sensing distance of a sub-goal stays below what is left, so that the density leads straight
-    along the path until something pushes the arm off it. A way that no guide proved keeps its
-    goal as the only sub-goal, with the full sensing distance: the plain density.
+    A sub-goal is in sight if the bound proves that the segment to it stays outside its sensing
+    regions, and if no joint is more than a quarter turn away:
+
+        d_k(q) - m + h_k > 2 σ_k + μ_k,
+
+    h_k and σ_k the sub-goal's own, μ_k the bound on the motion to it. A path is cut so finely that
+    from each sub-goal the next is in sight, so that Ψ = 1 on all that is followed and the density
+    leads straight along the path until something pushes the arm off it. A way that no guide
+    proved keeps its goal as the only sub-goal, with the full sensing distance: the plain density.
 
     Args:
         bound: proves what is in sight.
@@ -56,6 +64,9 @@ class SubGoalChain:
 
     SPACING = 0.05
     """Largest distance of neighbouring sub-goals in any joint [rad or m]."""
+    SIGHT = np.pi / 2
+    """Largest distance of a sub-goal in sight in any joint [rad or m]; the pull of a goal on a
+    circle grows up to there."""
 
     def __init__(self, bound: SweptBound, path: GuidePath, sensing: SensingParameters) -> None:
         arm = bound.arm
@@ -71,7 +82,8 @@ class SubGoalChain:
         self.joint_sensing_distance = np.full(arm.nv, sensing.joint)
         """Sensing distance of each joint's limits (nv,) [rad or m]."""
         if path.is_clear:
-            near = np.minimum(self.slack, np.minimum(_shifted(self.slack, 1), _shifted(self.slack, -1)))
+            before, after = _shifted(self.slack, 1), _shifted(self.slack, -1)
+            near = np.minimum(self.slack, np.minimum(before, after))
             np.minimum(sensing.path_share * near, sensing.distance, out=self.sensing_distance)
             angles = arm.angles(self.q)
             room = np.minimum(angles - arm.limits.lower, arm.limits.upper - angles).min(axis=0)
@@ -102,6 +114,8 @@ class SubGoalChain:
             distance,
             self._bound.margin,
             self.slack[self.current + 1],
+            self.sensing_distance[self.current + 1],
+            self.SIGHT,
         ):
             self.current += 1
         return self.current != before
@@ -127,11 +141,22 @@ def _shifted(rows: Array, by: int) -> Array:
 
 
 @compiled
-def _in_sight(lever: Array, step: Array, distance: Array, margin: float, slack: Array) -> bool:
+def _in_sight(
+    lever: Array,
+    step: Array,
+    distance: Array,
+    margin: float,
+    slack: Array,
+    sensing_distance: Array,
+    sight: float,
+) -> bool:
+    for j in range(step.shape[0]):
+        if step[j] > sight:
+            return False
     for k in range(lever.shape[0]):
-        motion = 0.0
+        motion = 2.0 * sensing_distance[k]
         for j in range(lever.shape[1]):
             motion += lever[k, j] * step[j]
-        if motion > max(distance[k] - margin, slack[k]):
+        if motion >= distance[k] - margin + slack[k]:
             return False
     return True

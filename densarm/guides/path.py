@@ -9,7 +9,7 @@ from densarm.arrays import Array
 from densarm.errors import InvalidValueError
 from densarm.guides.guide import FreeSpace, GuidePath, NoPath
 from densarm.guides.shortcut import shortcut
-from densarm.validation import positive, positive_integer
+from densarm.validation import non_negative, positive, positive_integer
 
 
 @dataclass(frozen=True)
@@ -28,11 +28,16 @@ class PathGuideParameters:
     shortcuts: int = 100
     """Shortcuts tried on a path that was found."""
 
+    limit_margin: float = 0.02
+    """Distance that paths keep from position limits, or half of what start and goal keep where
+    that is less [rad or m]."""
+
     def __post_init__(self) -> None:
         positive_integer("iterations", self.iterations)
         positive_integer("searches", self.searches)
         positive("extension", self.extension)
         positive_integer("shortcuts", self.shortcuts)
+        non_negative("limit_margin", self.limit_margin)
 
 
 class PathGuide:
@@ -77,12 +82,14 @@ class PathGuide:
         from densarm.guides.rrt_connect import rrt_connect
 
         p = self._parameters
+        bounds = self._bounds(start, goal)
         for _ in range(p.searches):
             path = rrt_connect(
                 self._arm,
                 self._freedom,
                 start,
                 goal,
+                bounds=bounds,
                 iterations=p.iterations,
                 extension=p.extension,
                 seed=int(rng.integers(1, 2**31)),
@@ -95,6 +102,14 @@ class PathGuide:
             f"the straight segment is not clear, and {p.searches} searches by RRT-Connect of "
             f"{p.iterations} iterations each found no path"
         )
+
+    def _bounds(self, start: Array, goal: Array) -> tuple[Array, Array]:
+        """Return position limits (nv,) moved inwards by the limit margin."""
+        limits, ends = self._arm.limits, self._arm.angles(np.stack([start, goal]))
+        below, above = (ends - limits.lower).min(axis=0), (limits.upper - ends).min(axis=0)
+        margin = self._parameters.limit_margin
+        lower = limits.lower + np.minimum(margin, 0.5 * below)
+        return lower, limits.upper - np.minimum(margin, 0.5 * above)
 
     def _fault(self, q: Array) -> str | None:
         limits, angles = self._arm.limits, self._arm.angles(q)

@@ -19,6 +19,7 @@ def rrt_connect(
     start: Array,
     goal: Array,
     *,
+    bounds: tuple[Array, Array],
     iterations: int,
     extension: float,
     seed: int,
@@ -26,10 +27,11 @@ def rrt_connect(
     """Search a path of clear segments between two clear configurations.
 
     Args:
-        arm: the arm, its bounded joints with finite limits.
+        arm: the arm.
         freedom: proves configurations and segments.
-        start: (nq,) configuration within limits.
-        goal: (nq,) configuration within limits.
+        start: (nq,) configuration within the bounds.
+        goal: (nq,) configuration within the bounds.
+        bounds: lowest and highest position of each joint (nv,) [rad or m].
         iterations: samples to draw at most.
         extension: longest edge of the trees [rad or m].
         seed: whole number >= 1; reseeds OMPL's generator, which is one for the process.
@@ -41,7 +43,7 @@ def rrt_connect(
         # OMPL calls a second seed non-deterministic, because generators already made keep
         # theirs; everything that draws here is made below, from this seed.
         ou.RNG.setSeed(seed)
-        space = _JointSpace(arm)
+        space = _JointSpace(arm, *bounds)
         information = space.information(freedom)
         problem = ob.ProblemDefinition(information)
         problem.setStartAndGoalStates(space.state(start), space.state(goal))
@@ -62,14 +64,14 @@ def rrt_connect(
 class _JointSpace:
     """OMPL's space of the joints: the bounded ones in one box, then a circle for each other."""
 
-    def __init__(self, arm: Arm) -> None:
+    def __init__(self, arm: Arm, lower: Array, upper: Array) -> None:
         self._arm = arm
         bounded, circles = np.flatnonzero(~arm.is_circle), np.flatnonzero(arm.is_circle)
         self._order = np.concatenate([bounded, circles])
         self._box = slice(0, len(bounded))
         self._space = ob.CompoundStateSpace()
         if bounded.size:  # OMPL refuses a box without a side
-            self._space.addSubspace(_box(arm.limits.lower[bounded], arm.limits.upper[bounded]), 1.0)
+            self._space.addSubspace(_box(lower[bounded], upper[bounded]), 1.0)
         self._circles = [self._space.getSubspaceCount() + k for k in range(len(circles))]
         for _ in circles:
             self._space.addSubspace(ob.SO2StateSpace(), 1.0)

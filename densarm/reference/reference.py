@@ -43,28 +43,47 @@ class Reference:
         """Return position, velocity and acceleration at time t [s]."""
         return ReferencePoint(*self.update(t).copy())
 
-    def update(self, t: float) -> Array:
-        """Return the rows position, velocity, acceleration (3, nv), overwritten by the next call."""
-        _hermite(t / self.period, self.period, self.position, self.velocity, self._point)
+    def update(self, t: float, lead: float = 0.0) -> Array:
+        """Return position, velocity and acceleration, in an array that the next call reuses.
+
+        Args:
+            t: time of position and velocity [s].
+            lead: how much later the acceleration is taken [s]; half of the time that a torque is
+                held makes it the mean over that time.
+
+        Returns:
+            Rows position, velocity, acceleration (3, nv), as in `ReferencePoint`.
+        """
+        u = t / self.period
+        _hermite(u, u + lead / self.period, self.period, self.position, self.velocity, self._point)
         return self._point
 
 
 @compiled
-def _hermite(u: float, period: float, position: Array, velocity: Array, out: Array) -> None:
+def _hermite(
+    u: float, u_acceleration: float, period: float, position: Array, velocity: Array, out: Array
+) -> None:
     last = position.shape[0] - 1
-    if not 0.0 <= u < last:
-        row = 0 if u < 0.0 else last
-        out[0] = position[row]
-        out[1] = 0.0
-        out[2] = 0.0
-        return
-    k = int(u)
-    x = u - k
     for j in range(position.shape[1]):
-        a, b = position[k, j], position[k + 1, j]
-        va, vb = velocity[k, j] * period, velocity[k + 1, j] * period
-        c2 = 3.0 * (b - a) - 2.0 * va - vb
-        c3 = 2.0 * (a - b) + va + vb
-        out[0, j] = a + x * (va + x * (c2 + x * c3))
-        out[1, j] = (va + x * (2.0 * c2 + 3.0 * x * c3)) / period
-        out[2, j] = (2.0 * c2 + 6.0 * x * c3) / (period * period)
+        out[0, j] = position[0, j] if u < 0.0 else position[last, j]
+        out[1, j] = 0.0
+        out[2, j] = 0.0
+        if 0.0 <= u < last:
+            x = u - int(u)
+            a, va, c2, c3 = _cubic(int(u), j, period, position, velocity)
+            out[0, j] = a + x * (va + x * (c2 + x * c3))
+            out[1, j] = (va + x * (2.0 * c2 + 3.0 * x * c3)) / period
+        if 0.0 <= u_acceleration < last:
+            x = u_acceleration - int(u_acceleration)
+            _, _, c2, c3 = _cubic(int(u_acceleration), j, period, position, velocity)
+            out[2, j] = (2.0 * c2 + 6.0 * x * c3) / (period * period)
+
+
+@compiled
+def _cubic(
+    k: int, j: int, period: float, position: Array, velocity: Array
+) -> tuple[float, float, float, float]:
+    """Return the coefficients of joint j's polynomial between samples k and k + 1."""
+    a, b = position[k, j], position[k + 1, j]
+    va, vb = velocity[k, j] * period, velocity[k + 1, j] * period
+    return a, va, 3.0 * (b - a) - 2.0 * va - vb, 2.0 * (a - b) + va + vb

@@ -14,8 +14,10 @@ from densarm.reference.smooth_path import SmoothPath
 from densarm.reference.timing_parameters import TimingParameters
 
 _UNLIMITED = 1e4  # stands for an infinite limit, which TOPP-RA's solver does not take
-_GRID_STEP = 0.02  # [rad] between grid points
-_GRID = (60, 400)
+_GRID_STEP = 0.01  # [rad] between grid points
+_GRID = (100, 1000)
+_GRID_SHARE = 0.98  # of the limits at grid points; the rest is for what lies between them
+_SLOWDOWNS = 1.02 ** np.arange(50)  # tried in turn until the limits hold at every sample
 
 toppra.setup_logging("CRITICAL")
 
@@ -46,21 +48,40 @@ def time_path(
         parametrizer="ParametrizeConstAccel",
     )
     timed = instance.compute_trajectory(0.0, 0.0)
-    if timed is None:
-        raise InfeasibleTimingError(
-            f"arm {arm.name!r}: its torque limits allow no motion along the planned path"
-        )
-    return _sampled(timed, period)
+    for slowdown in _SLOWDOWNS if timed is not None else ():
+        reference = _sampled(timed, slowdown * timed.duration, period)
+        if _is_within_limits(arm, reference, parameters):
+            return reference
+    raise InfeasibleTimingError(
+        f"arm {arm.name!r}: its torque limits allow no motion along the planned path"
+    )
 
 
-def _sampled(timed: toppra.ParametrizeConstAccel, period: float) -> Reference:
-    """Sample at a whole number of periods, slowed by less than one of them."""
-    count = max(1, int(np.ceil(timed.duration / period)))
-    stretch = timed.duration / (count * period)
+def _sampled(timed: toppra.ParametrizeConstAccel, duration: float, period: float) -> Reference:
+    """Sample a timing, stretched to a whole number of periods not below the duration."""
+    count = max(1, int(np.ceil(duration / period)))
     at = np.linspace(0.0, timed.duration, count + 1)
-    velocity = timed(at, 1) * stretch
+    velocity = timed(at, 1) * timed.duration / (count * period)
     velocity[[0, -1]] = 0.0
     return Reference(period, timed(at, 0), velocity)
+
+
+def _is_within_limits(arm: Arm, reference: Reference, parameters: TimingParameters) -> bool:
+    """Check all samples: TOPP-RA holds the limits at its grid points only."""
+    limits, data = arm.limits, arm.model.createData()
+    if (np.abs(reference.velocity) > parameters.velocity_share * limits.velocity).any():
+        return False
+    acceleration = np.diff(reference.velocity, axis=0) / reference.period
+    if (np.abs(acceleration) > parameters.acceleration_share * limits.acceleration).any():
+        return False
+    states = zip(
+        arm.configurations(reference.position[:-1]),
+        reference.velocity[:-1],
+        acceleration,
+        strict=True,
+    )
+    torque = np.array([pin.rnea(arm.model, data, *state) for state in states])
+    return bool((np.abs(torque) <= parameters.torque_share * limits.effort).all())
 
 
 def _constraints(arm: Arm, parameters: TimingParameters) -> list[toppra.constraint.Constraint]:
@@ -83,11 +104,11 @@ def _constraints(arm: Arm, parameters: TimingParameters) -> list[toppra.constrai
 
 
 def _both_sides(limit: Array) -> Array:
-    bounded = np.minimum(limit, _UNLIMITED)
+    bounded = np.minimum(_GRID_SHARE * limit, _UNLIMITED)
     return np.column_stack([-bounded, bounded])
 
 
-class _ToppraPath(toppra.interpolator.AbstractGeometricPath):  # type: ignore[misc]
+class _ToppraPath(toppra.interpolator.AbstractGeometricPath):
     """A SmoothPath as TOPP-RA asks for it."""
 
     def __init__(self, path: SmoothPath, dof: int) -> None:

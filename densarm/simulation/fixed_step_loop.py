@@ -11,7 +11,7 @@ from densarm.arrays import Array
 from densarm.control.controller import Controller
 from densarm.errors import InvalidValueError
 from densarm.simulation.plant import Integrator, PinocchioPlant
-from densarm.validation import positive, positive_integer
+from densarm.validation import one_of, positive, positive_integer
 
 REACHED_POSITION = 0.01
 """Largest position error of a joint at the goal [rad or m]."""
@@ -46,15 +46,13 @@ class SimulationParameters:
 
     def __post_init__(self) -> None:
         for name in ("dt", "time_limit", "hold_time", "stall_time"):
-            positive(f"simulation.{name}", getattr(self, name))
-        positive_integer("simulation.control_divisor", self.control_divisor)
-        if self.integrator not in set(Integrator):
-            allowed = "one of " + ", ".join(Integrator)
-            raise InvalidValueError("simulation.integrator", self.integrator, allowed)
-        if self.time_limit / self.dt > 1e7:
-            raise InvalidValueError(
-                "simulation.time_limit", self.time_limit, f"at most 1e7 steps of dt = {self.dt}"
-            )
+            positive(name, getattr(self, name))
+        positive_integer("control_divisor", self.control_divisor)
+        integrator = Integrator(one_of("integrator", self.integrator, list(Integrator)))
+        object.__setattr__(self, "integrator", integrator)
+        if not 1.0 <= self.time_limit / self.dt <= 1e7:
+            allowed = f"between 1 and 1e7 steps of dt = {self.dt}"
+            raise InvalidValueError("time_limit", self.time_limit, allowed)
 
     @property
     def control_period(self) -> float:
@@ -96,7 +94,7 @@ class FixedStepLoop:
     def __init__(self, arm: Arm, parameters: SimulationParameters) -> None:
         self._arm = arm
         self._parameters = parameters
-        self._plant = PinocchioPlant(arm, parameters.dt, Integrator(parameters.integrator))
+        self._plant = PinocchioPlant(arm, parameters.dt, parameters.integrator)
 
     def run(
         self,
@@ -104,7 +102,7 @@ class FixedStepLoop:
         start: Array,
         goal: Array,
         not_before: float = 0.0,
-        on_progress: Callable[[float], None] = lambda time: None,
+        on_progress: Callable[[float], None] = lambda _: None,
     ) -> Recording:
         """Return the run from rest at the start.
 
@@ -119,7 +117,7 @@ class FixedStepLoop:
         held, end = 0, LoopEnd.TIMED_OUT
         rest, rested_since = q, 0
         states, torques = [(q, v)], []
-        for k in range(int(round(p.time_limit / p.dt))):
+        for k in range(round(p.time_limit / p.dt)):
             if k % p.control_divisor == 0:
                 tau = controller.torque(k * p.dt, q, v)
             q, v = self._plant.step(q, v, tau)
@@ -138,7 +136,7 @@ class FixedStepLoop:
                 on_progress(k * p.dt)
         torques.append(torques[-1])
         return Recording(
-            time=p.dt * np.arange(len(states)),
+            time=p.dt * np.arange(len(states), dtype=np.float64),
             q=np.array([state[0] for state in states]),
             v=np.array([state[1] for state in states]),
             tau=np.array(torques),

@@ -59,7 +59,7 @@ class PinocchioPlant:
         return self._advance(q, v, tau)
 
     def acceleration(self, q: Array, v: Array, tau: Array) -> Array:
-        """Return the acceleration (nv,) [rad/s²] that torque causes; overwritten by the next call."""
+        """Return the acceleration (nv,) [rad/s²] of a torque, overwritten by the next call."""
         return pin.aba(self._model, self._data, q, v, tau)  # type: ignore[no-any-return]
 
     def _semi_implicit_euler(self, q: Array, v: Array, tau: Array) -> tuple[Array, Array]:

@@ -10,7 +10,7 @@ import numpy as np
 
 from densarm.arm import Arm
 from densarm.arrays import Array
-from densarm.errors import FileContentError
+from densarm.atomic_file import atomic_file
 from densarm.scene import Scene
 from densarm.visualization.drawing_recorder import DrawingRecorder
 from densarm.visualization.meshcat_player import MeshcatPlayer
@@ -51,7 +51,8 @@ def write_html(
         viewer=viewer.read_text(encoding="utf-8"),
         drawing=_drawing(arm, scene, time, q, goal),
     )
-    _write_whole(Path(path), text)
+    with atomic_file(Path(path)) as file:
+        file.write(text.encode())
 
 
 def _drawing(arm: Arm, scene: Scene, time: Array, q: Array, goal: Array) -> str:
@@ -63,14 +64,3 @@ def _drawing(arm: Arm, scene: Scene, time: Array, q: Array, goal: Array) -> str:
     player.place_camera(np.vstack([q, goal]))
     player.viewer.set_animation(player.animation(time, q), play=False)
     return recorder.packed()
-
-
-def _write_whole(path: Path, text: str) -> None:
-    part = path.with_name(f"{path.name}.part")
-    try:
-        part.write_text(text, encoding="utf-8")
-        part.replace(path)
-    except OSError as error:
-        raise FileContentError(path, f"cannot be written ({error.strerror})") from None
-    finally:
-        part.unlink(missing_ok=True)

@@ -24,7 +24,7 @@ _SKY, _HORIZON = [1.0, 1.0, 1.0], [0.86, 0.89, 0.92]
 _LIGHTS = {"AmbientLight": 0.5, "FillLight": 0.3}  # meshcat's own values bleach light colours
 _FLOOR_CELL = 0.25  # [m]
 _PATH_RADIUS = 0.005  # of the drawn end-effector path, as a part of the arm's extent
-_SURROUNDINGS = 0.5  # seen around the motion where obstacles stand, as a part of its extent
+_SURROUNDINGS = 0.75  # seen around the motion where obstacles stand, as a part of its extent
 _VIEWED_SAMPLES = 60  # configurations of a motion that the camera is placed for
 
 
@@ -94,7 +94,8 @@ class MeshcatPlayer:
             points = np.vstack([points, np.clip(obstacles, low - margin, high + margin)])
         self._draw_floor(points)
         camera = Camera.facing(points)
-        self.viewer["/Cameras/default"].set_transform(_translation(camera.target))
+        # The camera always looks at its node's origin, so the drawing moves instead.
+        self.viewer.set_transform(_translation(-camera.target))
         lens = self.viewer["/Cameras/default/rotated/<object>"]
         lens.set_property("fov", FIELD_OF_VIEW)
         x, y, z = camera.offset.tolist()

@@ -101,12 +101,25 @@ def test_page_says_nothing_and_asks_nobody(page: Any) -> None:
     assert {url.split(":")[0] for url in page.requests()} <= {"file", "data", "blob"}
 
 
-def test_single_sample(open_page: Callable[[str], Any], tmp_path: Path) -> None:
+CORNERS_IN_PICTURE = """(() => {
+    const box = new MeshCat.THREE.Box3();
+    for (const part of ["robot", "obstacles"])
+        box.expandByObject(viewer.scene_tree.find(["meshcat", part]).object);
+    return [box.min, box.max].map(corner => corner.project(viewer.camera).toArray());
+})()"""
+
+
+def test_single_sample_off_centre(open_page: Callable[[str], Any], tmp_path: Path) -> None:
     arm = load_arm("two_link")
     q = arm.configuration([0.3, 0.3])[None]
-    page = open_page(write(tmp_path / "a.html", time=np.zeros(1), q=q, scene=Scene()).as_uri())
+    scene = Scene([Sphere(name="ball", radius=0.3, position=(1.5, 0.0, 0.5))])
+    file = write(tmp_path / "a.html", time=np.zeros(1), q=q, scene=scene, goal=q[0])
+    page = open_page(file.as_uri())
     page.wait_until("playing")
     assert changed(page, visible(["meshcat", "robot"], value=False)) > 100
+    corners = np.array(page.evaluate(CORNERS_IN_PICTURE))
+    assert np.all(np.abs(corners) < 1.0)
+    np.testing.assert_allclose(corners[:, :2].sum(axis=0), 0.0, atol=0.3)
     assert page.complaints() == []
 
 

@@ -1,9 +1,11 @@
-"""simulate: a scenario's closed loop, from planning to the recorded outcome."""
+"""A scenario's closed loop, from planning to the recorded outcome."""
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from densarm.arrays import Array
 from densarm.clearance import Clearance
@@ -17,6 +19,8 @@ from densarm.guides.guide import Guide, NoPath
 from densarm.motion_plan import MotionPlan, plan_motion
 from densarm.outcome import Outcome
 from densarm.reference.infeasible_timing import InfeasibleTimingError
+from densarm.reference.reference import Reference
+from densarm.reference.reference_density import reference_density
 from densarm.scenario import ControlForm, GuideKind, Scenario
 from densarm.simulation.fixed_step_loop import FixedStepLoop, LoopEnd, Recording
 from densarm.trajectory import Trajectory
@@ -30,7 +34,7 @@ def simulate(
     scenario: Scenario,
     guide: Guide | GuideKind | str | None = None,
     seed: int | None = None,
-    on_progress: OnProgress = lambda phrase: None,
+    on_progress: OnProgress = lambda _: None,
 ) -> Trajectory:
     """Plan and run a scenario's torque-driven closed loop.
 
@@ -41,14 +45,17 @@ def simulate(
         on_progress: told what is being done.
 
     Returns:
-        The recorded run. Whatever happened is its `outcome`, not an exception. The same scenario
-        and seed give the same run, bit for bit.
+        The recorded run with its scenario, guide and seed as they were. Whatever happened is its
+        `outcome`, not an exception. The same scenario and seed give the same run, bit for bit.
 
     Raises:
-        InvalidValueError: a guide of an unknown name.
+        InvalidValueError: a guide of an unknown name, or a seed that is not a whole number.
     """
     if isinstance(guide, str):
         guide = GuideKind(one_of("guide", guide, list(GuideKind)))
+        scenario = replace(scenario, control=replace(scenario.control, guide=guide))
+    if seed is not None:
+        scenario = replace(scenario, seed=seed)
     guide = scenario.control.guide if guide is None else guide
     clearance = Clearance(scenario.arm, scenario.scene)
     if fault := _fault(scenario, clearance):
@@ -56,7 +63,7 @@ def simulate(
     on_progress("planning")
     began = time.perf_counter()
     try:
-        plan = plan_motion(scenario, clearance, guide, scenario.seed if seed is None else seed)
+        plan = plan_motion(scenario, clearance, guide)
     except InfeasibleTimingError as error:
         return _at_rest(scenario, clearance, Outcome.INFEASIBLE, str(error))
     plan_time = 0.0 if guide == GuideKind.DIRECT else time.perf_counter() - began
@@ -73,9 +80,11 @@ def make_controller(scenario: Scenario, plan: MotionPlan) -> Controller:
         plan: the way that it drives the arm along.
     """
     arm, period = scenario.arm, scenario.simulation.control_period
-    if scenario.control.form == ControlForm.TRACKING:
-        density, distance = plan.guided.density, plan.guided.goal_distance
-        return DensityTracking(arm, density, distance, plan.reference, scenario.gains)
+    if plan.reference is not None:
+        density = reference_density(
+            plan.bound, plan.reference, scenario.sensing, scenario.density, scenario.control.kappa
+        )
+        return DensityTracking(arm, density, plan.reference, scenario.gains)
     field = DensityField(plan.guided, SpeedLaw(plan.bound, scenario.speed), scenario.gains.rate)
     if scenario.control.form == ControlForm.REGULATION:
         return DensityRegulation(arm, field, scenario.gains, period)
@@ -89,12 +98,11 @@ def _run(
     plan_time: float,
     on_progress: OnProgress,
 ) -> Trajectory:
-    tracks = scenario.control.form == ControlForm.TRACKING
     recording = FixedStepLoop(scenario.arm, scenario.simulation).run(
         make_controller(scenario, plan),
         scenario.start_configuration,
         scenario.goal_configuration,
-        not_before=plan.reference.duration if tracks else 0.0,
+        not_before=0.0 if plan.reference is None else plan.reference.duration,
         on_progress=lambda at: on_progress(f"running, {at:.1f} s simulated"),
     )
     on_progress("computing clearance")
@@ -104,18 +112,19 @@ def _run(
     if (smallest <= 0.0).any():
         last = int(np.argmax(smallest <= 0.0)) + 1
         outcome = Outcome.COLLIDED
-        detail = f"{' and '.join(clearance.pairs[pair[last - 1]])} at t = {recording.time[last - 1]:.3f} s"
+        touching = " and ".join(clearance.pairs[pair[last - 1]])
+        detail = f"{touching} at t = {recording.time[last - 1]:.3f} s"
     return Trajectory(
         scenario=scenario,
         time=recording.time[:last],
         q=recording.q[:last],
         v=recording.v[:last],
-        tau=recording.tau[:last],
+        tau=recording.tau[np.minimum(np.arange(last), max(last - 2, 0))],
         clearance=smallest[:last],
         outcome=outcome,
         detail=detail,
         plan_time=plan_time,
-        tracking_error=_tracking_error(scenario, plan, recording) if tracks else None,
+        tracking_error=_tracking_error(scenario, plan.reference, recording),
     )
 
 
@@ -124,10 +133,10 @@ def _outcome(recording: Recording, plan: MotionPlan) -> tuple[Outcome, str]:
         return Outcome.REACHED, ""
     if recording.end == LoopEnd.TIMED_OUT:
         return Outcome.TIMED_OUT, f"after {recording.time[-1]:.3g} s"
-    return Outcome.STUCK, plan.curve.detail or "at rest away from the goal"
+    return Outcome.STUCK, plan.guided.describe_stall(recording.q[-1])
 
 
-def _smallest_distances(clearance: Clearance, q: Array) -> tuple[Array, Array]:
+def _smallest_distances(clearance: Clearance, q: Array) -> tuple[Array, NDArray[np.int64]]:
     """Return the smallest distance (N,) and its pair (N,) at every sample (N, nq)."""
     if clearance.n_pairs == 0:
         return np.full(len(q), np.inf), np.zeros(len(q), dtype=np.int64)
@@ -139,28 +148,41 @@ def _smallest_distances(clearance: Clearance, q: Array) -> tuple[Array, Array]:
     return smallest, pair
 
 
-def _tracking_error(scenario: Scenario, plan: MotionPlan, recording: Recording) -> float:
+def _tracking_error(
+    scenario: Scenario, reference: Reference | None, recording: Recording
+) -> float | None:
+    if reference is None:
+        return None
     arm = scenario.arm
-    wanted = np.array([plan.reference.sample(t).position for t in recording.time])
+    wanted = np.array([reference.sample(t).position for t in recording.time])
     return float(np.abs(arm.difference(arm.configurations(wanted), recording.q)).max())
 
 
 def _fault(scenario: Scenario, clearance: Clearance) -> str:
     """Return what makes start or goal infeasible, as a phrase; empty if nothing does."""
-    arm, margin = scenario.arm, scenario.control.margin
-    faults = []
-    for name, angles in (("start", np.array(scenario.start)), ("goal", np.array(scenario.goal))):
-        limits = arm.limits
-        for j in np.flatnonzero((angles < limits.lower) | (angles > limits.upper)):
-            faults.append(
-                f"{name}: joint {arm.joint_names[j]!r} = {angles[j]:.4g} is outside "
-                f"[{limits.lower[j]:.4g}, {limits.upper[j]:.4g}]"
-            )
-        distance = clearance.distances(arm.configuration(angles))
-        for k in np.argsort(distance)[: int((distance <= margin).sum())]:
-            a, b = clearance.pairs[k]
-            faults.append(f"{name}: {a} and {b} are {distance[k] * 1e3:.3g} mm apart")
-    return "; ".join(faults)
+    ends = {"start": scenario.start, "goal": scenario.goal}
+    return "; ".join(
+        f"{name}: {fault}"
+        for name, angles in ends.items()
+        for fault in [
+            *_limit_faults(scenario, np.array(angles)),
+            *_contact_faults(scenario, clearance, np.array(angles)),
+        ]
+    )
+
+
+def _limit_faults(scenario: Scenario, angles: Array) -> Iterator[str]:
+    limits, names = scenario.arm.limits, scenario.arm.joint_names
+    for j in np.flatnonzero((angles < limits.lower) | (angles > limits.upper)):
+        allowed = f"[{limits.lower[j]:.4g}, {limits.upper[j]:.4g}]"
+        yield f"joint {names[j]!r} at {angles[j]:.4g} is outside {allowed}"
+
+
+def _contact_faults(scenario: Scenario, clearance: Clearance, angles: Array) -> Iterator[str]:
+    distance = clearance.distances(scenario.arm.configuration(angles))
+    for k in np.argsort(distance)[: int((distance <= scenario.control.margin).sum())]:
+        pair, gap = " and ".join(clearance.pairs[k]), distance[k] * 1e3
+        yield f"{pair} overlap by {-gap:.3g} mm" if gap <= 0.0 else f"{pair} are {gap:.3g} mm apart"
 
 
 def _at_rest(

@@ -1,0 +1,74 @@
+"""Bisection: proof along a motion from distances at a few of its configurations."""
+
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from densarm.arrays import Array
+
+Pairs = NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class Bisection:
+    """Outcome of a bisection."""
+
+    evaluated: Array
+    """Increasing parameters of the configurations at which distances were computed."""
+    failing: Pairs
+    """The pairs that were not proved apart; empty when the motion is clear."""
+    failed_at: float
+    """Parameter at or after which they failed; NaN when clear."""
+    in_contact: bool
+    """Whether they are in contact there, and not merely unproved."""
+
+
+def bisect(
+    slack: Callable[[float, Pairs], Array],
+    motion: Callable[[float, float, Pairs], Array],
+    split: Callable[[float, float], float | None],
+    ends: tuple[float, float],
+    n_pairs: int,
+) -> Bisection:
+    """Prove pairs apart along a motion x(t), t between two ends.
+
+    A pair is apart on all of [a, b] if slack(a) + slack(b) > motion(a, b). Other pairs are tried
+    again on both halves, all longer arcs before shorter ones: most contacts are found early.
+
+    Args:
+        slack: t and pairs to their distances beyond what must be kept (len(pairs),) [m].
+        motion: a, b and pairs to bounds on how far their bodies move in between [m].
+        split: a and b to the parameter to evaluate between them, or None to give up.
+        ends: the first and the last parameter.
+        n_pairs: the pairs are 0 to n_pairs - 1.
+    """
+    every = np.arange(n_pairs)
+    evaluated = list(ends)
+    slack_first, slack_last = (slack(t, every) for t in ends)
+    for t, values in zip(ends, (slack_first, slack_last), strict=True):
+        if (values <= 0.0).any():
+            return _failure(evaluated, every[values <= 0.0], t, in_contact=True)
+    pending = deque([(*ends, slack_first, slack_last, every)])
+    while pending:
+        a, b, slack_a, slack_b, pairs = pending.popleft()
+        near = ~(slack_a + slack_b > motion(a, b, pairs))
+        if not near.any():
+            continue
+        pairs, slack_a, slack_b = pairs[near], slack_a[near], slack_b[near]
+        middle = split(a, b)
+        if middle is None:
+            return _failure(evaluated, pairs, a, in_contact=False)
+        evaluated.append(middle)
+        slack_middle = slack(middle, pairs)
+        if (slack_middle <= 0.0).any():
+            return _failure(evaluated, pairs[slack_middle <= 0.0], middle, in_contact=True)
+        pending.append((a, middle, slack_a, slack_middle, pairs))
+        pending.append((middle, b, slack_middle, slack_b, pairs))
+    return Bisection(np.unique(evaluated), every[:0], np.nan, in_contact=False)
+
+
+def _failure(evaluated: list[float], pairs: Pairs, at: float, *, in_contact: bool) -> Bisection:
+    return Bisection(np.unique(evaluated), pairs, at, in_contact)

@@ -1,0 +1,49 @@
+"""Reports in words: the summary of a run and the checks of a certificate."""
+
+import click
+import numpy as np
+
+from densarm.certificates.certificate import Certificate
+from densarm.outcome import Outcome
+from densarm.trajectory import Trajectory
+
+_COLUMN = 18  # characters
+
+
+def print_run(run: Trajectory, certificate: Certificate) -> None:
+    """Print how a run ended, its figures and what is proved about it."""
+    color = "green" if run.outcome == Outcome.REACHED else "red"
+    click.echo(f"{run.scenario.title}\n")
+    click.secho(f"{run.outcome}: {run.outcome.description}", fg=color, bold=True)
+    if run.detail:
+        click.echo(run.detail)
+    click.echo()
+    for label, value in _figures(run).items():
+        click.echo(f"{label:<{_COLUMN}}{value}")
+    click.echo()
+    print_certificate(certificate)
+
+
+def print_certificate(certificate: Certificate) -> None:
+    """Print each check of a certificate and whether it holds."""
+    click.echo(f"{'certified':<{_COLUMN}}{_verdict(certificate.certified)}")
+    for check in certificate.checks:
+        click.echo(f"  {check.name:<{_COLUMN - 2}}{_verdict(check.holds)}  {check.detail}")
+
+
+def _figures(run: Trajectory) -> dict[str, str]:
+    smallest = float(run.clearance.min())
+    figures = {
+        "duration": f"{run.time[-1]:.3f} s",
+        "min clearance": f"{smallest * 1e3:.4g} mm" if np.isfinite(smallest) else "no pairs",
+        "goal error": f"{run.goal_error:.2g} rad",
+        "peak torque": f"{run.peak_torque_ratio:.0%} of the limits",
+        "planning": f"{run.plan_time:.2f} s",
+    }
+    if run.tracking_error is not None:
+        figures["tracking error"] = f"{run.tracking_error:.2g} rad"
+    return figures
+
+
+def _verdict(holds: bool) -> str:
+    return click.style("yes", fg="green") if holds else click.style("no ", fg="red")

@@ -1,0 +1,235 @@
+"""Integral curves of a navigation field on Rⁿ, from many starts at once."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from densarm.arrays import Array
+from densarm.fields.navigation_field import NavigationField
+from densarm.outcome import Outcome
+from densarm.validation import positive, positive_integer
+
+
+@dataclass(frozen=True)
+class CurveParameters:
+    """Parameters of `integral_curves`.
+
+    Raises:
+        InvalidValueError: a value out of its range.
+    """
+
+    tolerance: float = 1e-4
+    """Largest estimated error of a step [m]."""
+    reach_radius: float = 1e-3
+    """Distance from the goal at which a curve has reached it [m]."""
+    clearance_share: float = 0.5
+    """A step's length per estimated distance h/‖∇h‖ to the nearest obstacle."""
+    longest_step: float = 0.25
+    """Longest step [m]."""
+    shortest_step: float = 1e-8
+    """A curve that must step shorter than this has met a critical point [m]."""
+    longest_curve: float = 1e3
+    """Length at which a curve is given up [m]."""
+    most_steps: int = 20_000
+    """Steps after which all curves are given up."""
+
+    def __post_init__(self) -> None:
+        for name in (
+            "tolerance",
+            "reach_radius",
+            "clearance_share",
+            "longest_step",
+            "shortest_step",
+            "longest_curve",
+        ):
+            positive(name, getattr(self, name))
+        positive_integer("most_steps", self.most_steps)
+
+
+@dataclass(frozen=True)
+class IntegralCurves:
+    """How the curves from N starts ended."""
+
+    outcome: NDArray[np.str_]
+    """The word of an `Outcome` (N,): reached, stuck, collided, timed_out or infeasible."""
+    end: Array
+    """Last points (N, n) [m]."""
+    length: Array
+    """Lengths (N,) [m]."""
+    smallest_h: Array
+    """Smallest value of any obstacle's h on each curve (N,), in its unit; +inf of none."""
+    paths: tuple[Array, ...]
+    """Points of each curve (M_i, n) [m], start and end included; empty unless recorded."""
+
+    def count(self, outcome: Outcome) -> int:
+        """Return the number of curves with an outcome."""
+        return int(np.count_nonzero(self.outcome == outcome))
+
+    def rate(self, outcome: Outcome) -> float:
+        """Return the share of curves with an outcome."""
+        return self.count(outcome) / len(self.outcome)
+
+
+def integral_curves(
+    field: NavigationField,
+    starts: Array,
+    parameters: CurveParameters = CurveParameters(),
+    record: bool = False,
+) -> IntegralCurves:
+    r"""Follow a field from many starts, by arc length instead of time.
+
+    .. math:: \frac{dx}{ds} = \frac{k(x)}{\|k(x)\|}
+
+    The curves are those of ẋ = k(x), whose speed spans many decades. Along
+    the rim of a sensing region the field is stiff, so the integrator is Shampine and Reichelt's
+    Rosenbrock method of order 2, with a step of its own for each start: it is
+    rejected and shortened where its error estimate exceeds the tolerance or the direction turns
+    by more than half a unit; it is no longer than half the distance to the goal, or the given
+    share of h/‖∇h‖, an obstacle's distance to first order, plus the tolerance. Only accepted points count: a field that leads into an obstacle
+    does enter it.
+
+    A curve has *reached* within the reach radius; has *collided* at h ≤ 0; is *stuck* where k
+    vanishes or turns within the shortest step; is *infeasible* if it starts in an obstacle.
+
+    Args:
+        field: the field and its obstacles.
+        starts: shape (N, n) [m].
+        parameters: tolerances and limits.
+        record: whether to keep the points of every curve.
+
+    Returns:
+        The outcome of each start.
+
+    Source: L. F. Shampine, M. W. Reichelt, SIAM J. Sci. Comput. 18(1), 1997, section 3.
+    """
+    front = _Front(field, np.array(starts, np.float64), parameters)
+    history = [(np.arange(len(starts)), front.x.copy())] if record else []
+    for _ in range(parameters.most_steps):
+        moved = front.advance()
+        if record:
+            history.append((moved, front.x[moved]))
+        if front.active.size == 0:
+            break
+    return IntegralCurves(
+        front.outcome,
+        front.x,
+        front.length,
+        front.smallest_h,
+        tuple(_assemble(history, len(starts))) if record else (),
+    )
+
+
+@dataclass
+class _Front:
+    """The points that the curves have come to."""
+
+    field: NavigationField
+    x: Array
+    parameters: CurveParameters
+    active: NDArray[np.intp] = field(init=False)
+
+    def __post_init__(self) -> None:
+        count, p = len(self.x), self.parameters
+        self.smallest_h = np.full(count, np.inf)
+        self.longest = np.empty(count)
+        self._look_around(np.arange(count))
+        self.length = np.zeros(count)
+        self.step = np.full(count, p.longest_step)
+        self.slope = _unit(self.field.direction(self.x))
+        self.outcome = np.full(count, Outcome.TIMED_OUT, dtype="U10")
+        self.outcome[self.smallest_h <= 0.0] = Outcome.INFEASIBLE
+        self.active = np.flatnonzero(self.smallest_h > 0.0)
+        self._retire()
+
+    def advance(self) -> NDArray[np.intp]:
+        """Try one step of each active curve; return the indices of those that moved."""
+        i, p = self.active, self.parameters
+        x, f0 = self.x[i], self.slope[i]
+        step = np.minimum(self.step[i], self.longest[i])
+        ahead, f2, error = self._rosenbrock(x, f0, step)
+        # Across a critical point the direction reverses, however short the step.
+        turn = np.linalg.norm(f2 - f0, axis=-1)
+        accepted = (error <= p.tolerance) & (turn <= _LARGEST_TURN)
+        factor = 0.9 * np.cbrt(p.tolerance / np.maximum(error, 1e-300))
+        factor = np.where(turn > _LARGEST_TURN, 0.5 * np.minimum(factor, 1.0), factor)
+        self.step[i] = np.minimum(step * np.clip(factor, 0.2, 5.0), p.longest_step)
+        moved = i[accepted]
+        self.x[moved], self.slope[moved] = ahead[accepted], f2[accepted]
+        self.length[moved] += np.linalg.norm(ahead - x, axis=-1)[accepted]
+        self._look_around(moved)
+        self._retire()
+        return moved
+
+    def _rosenbrock(self, x: Array, f0: Array, step: Array) -> tuple[Array, Array, Array]:
+        """Return the points (N, n) a step ahead, the field there, and error estimates (N,)."""
+        size = step[:, np.newaxis]
+        system = np.eye(x.shape[-1]) - _DAMPING * size[..., np.newaxis] * self._jacobian(x)
+
+        def solve(right: Array) -> Array:
+            return np.linalg.solve(system, right[..., np.newaxis])[..., 0]
+
+        k1 = solve(f0)
+        f1 = self._unit_at(x + 0.5 * size * k1)
+        k2 = solve(f1 - k1) + k1
+        ahead = x + size * k2
+        f2 = self._unit_at(ahead)
+        k3 = solve(f2 - _ERROR_WEIGHT * (k2 - f1) - 2.0 * (k1 - f0))
+        return ahead, f2, step / 6.0 * np.linalg.norm(k1 - 2.0 * k2 + k3, axis=-1)
+
+    def _jacobian(self, x: Array) -> Array:
+        """Return ∂f/∂x (N, n, n) at points (N, n), by central differences."""
+        axes = _DIFFERENCE * np.eye(x.shape[-1])
+        both = self._unit_at(x[:, np.newaxis, :] + np.concatenate([axes, -axes]))
+        ahead, behind = np.split(both, 2, axis=1)
+        return np.swapaxes(ahead - behind, 1, 2) / (2.0 * _DIFFERENCE)
+
+    def _look_around(self, i: NDArray[np.intp]) -> None:
+        """Update smallest values of h and longest steps of the curves `i`."""
+        p, x = self.parameters, self.x[i]
+        longest = 0.5 * np.linalg.norm(x - self.field.goal, axis=-1)
+        for obstacle in self.field.obstacles:
+            h, slope = obstacle(x), np.linalg.norm(obstacle.gradient(x), axis=-1)
+            self.smallest_h[i] = np.minimum(self.smallest_h[i], h)
+            distance = np.abs(h) / np.maximum(slope, 1e-300)
+            longest = np.minimum(longest, p.clearance_share * distance + p.tolerance)
+        self.longest[i] = longest
+
+    def _retire(self) -> None:
+        """Give every active curve that has ended its outcome."""
+        i, p = self.active, self.parameters
+        distance = np.linalg.norm(self.x[i] - self.field.goal, axis=-1)
+        still = np.linalg.norm(self.slope[i], axis=-1) == 0.0
+        ends = (
+            (self.length[i] > p.longest_curve, Outcome.TIMED_OUT),
+            (still | (self.step[i] < p.shortest_step), Outcome.STUCK),
+            (distance <= p.reach_radius, Outcome.REACHED),
+            (self.smallest_h[i] <= 0.0, Outcome.COLLIDED),
+        )
+        for ended, outcome in ends:
+            self.outcome[i[ended]] = outcome
+        self.active = i[~np.any([ended for ended, _ in ends], axis=0)]
+
+    def _unit_at(self, x: Array) -> Array:
+        return _unit(self.field.direction(x))
+
+
+_LARGEST_TURN = 0.5  # change of the unit direction in a step
+_DIFFERENCE = 1e-6  # of points for the Jacobian [m]
+_DAMPING = 1.0 / (2.0 + np.sqrt(2.0))  # makes the method L-stable
+_ERROR_WEIGHT = 6.0 + np.sqrt(2.0)
+
+
+def _unit(k: Array) -> Array:
+    norm = np.linalg.norm(k, axis=-1, keepdims=True)
+    return k / np.where(norm > 0.0, norm, 1.0)
+
+
+def _assemble(history: list[tuple[NDArray[np.intp], Array]], count: int) -> Iterator[Array]:
+    index = np.concatenate([moved for moved, _ in history])
+    points = np.concatenate([x for _, x in history])
+    order = np.argsort(index, kind="stable")
+    bounds = np.searchsorted(index[order], np.arange(count + 1))
+    for start, stop in zip(bounds[:-1], bounds[1:], strict=True):
+        yield points[order[start:stop]]

@@ -1,0 +1,90 @@
+import json
+import subprocess
+import sys
+
+import click
+import pytest
+
+from densarm.catalogue import robot_names, scenario_paths
+from densarm.cli.application import application
+from densarm.cli.run import run
+from densarm.scenario import GuideKind
+
+
+def paths(group: click.Group, before: tuple[str, ...] = ()) -> list[tuple[str, ...]]:
+    found = []
+    for name, command in group.commands.items():
+        found.append((*before, name))
+        if isinstance(command, click.Group):
+            found += paths(command, (*before, name))
+    return found
+
+
+@pytest.mark.parametrize("path", [(), *paths(application)])
+def test_every_help_explains_itself_with_an_example(command, path):
+    done = command(*path, "--help")
+    assert done.status == 0
+    assert done.err == ""
+    assert f"Usage: {' '.join(['densarm', *path])}" in done.out
+    assert "Example" in done.out
+    assert f"    densarm {' '.join(path)}" in done.out
+
+
+@pytest.mark.parametrize("path", paths(application))
+def test_every_option_and_argument_is_explained(path):
+    command = application
+    for name in path:
+        command = command.commands[name]
+    options = [param for param in command.params if isinstance(param, click.Option)]
+    assert all(option.help for option in options)
+
+
+def test_without_arguments_it_prints_the_help(command):
+    assert command() == command("--help")
+
+
+def test_list_names_robots_and_scenarios_with_titles(command):
+    done = command("list")
+    assert done.status == 0
+    words = done.out.split()
+    assert {*robot_names(), *scenario_paths()} <= set(words)
+    assert "Swing a two-link arm from hanging to upright between two obstacles" in done.out
+
+
+def test_help_and_list_start_without_heavy_libraries():
+    script = (
+        "import json, sys; from densarm.cli import main; main(['--help']); main(['list']);"
+        "print(json.dumps(list(sys.modules)))"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", script], capture_output=True, text=True, check=True
+    )
+    heavy = {"numpy", "pinocchio", "rich", "pydantic", "numba", "matplotlib", "meshcat"}
+    assert heavy & set(json.loads(done.stdout.splitlines()[-1])) == set()
+
+
+def test_guides_to_choose_from_are_those_that_exist():
+    guide = next(param for param in run.params if param.name == "guide")
+    assert set(guide.type.choices) == set(GuideKind)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "expected"),
+    [
+        (["frobnicate"], "No such command 'frobnicate'"),
+        (["run"], "Missing argument 'SCENARIO'"),
+        (["run", "swing_up", "extra"], "extra"),
+        (["run", "swing_up", "--frob"], "--frob"),
+        (["run", "swing_up", "--guide", "sideways"], "'sideways' is not one of 'path', 'direct'"),
+        (["run", "swing_up", "--seed", "-1"], "--seed"),
+        (["run", "swing_up", "--seed", "a"], "--seed"),
+        (["bench"], "Missing command"),
+        (["bench", "step", "--pairs", "0"], "--pairs"),
+    ],
+)
+def test_wrong_usage_is_one_line(command, arguments, expected):
+    done = command(*arguments)
+    assert done.status == 2
+    assert done.out == ""
+    assert done.err.count("\n") == 1
+    assert expected in done.err

@@ -1,0 +1,85 @@
+import os
+import pty
+import signal
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from densarm.simulation.plant import PinocchioPlant
+
+# A process started in the background inherits that Ctrl-C is ignored.
+PROGRAM = """
+import signal, sys
+from densarm.cli import main
+signal.signal(signal.SIGINT, signal.default_int_handler)
+sys.exit(main())
+"""
+
+
+def interrupt(*_arguments, **_options):
+    signal.raise_signal(signal.SIGINT)
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="reads a pseudo-terminal as Linux has them")
+def test_ctrl_c_on_a_terminal_while_running(tmp_path):
+    ours, theirs = pty.openpty()
+    process = subprocess.Popen(
+        [sys.executable, "-c", PROGRAM, "run", "swing_up", "--save", tmp_path / "run.npz"],
+        stdin=theirs,
+        stdout=theirs,
+        stderr=subprocess.PIPE,
+        env={**os.environ, "TERM": "xterm"},
+    )
+    shown = b""
+    while b"running" not in shown:
+        shown += os.read(ours, 4096)
+    process.send_signal(signal.SIGINT)
+    _, err = process.communicate(timeout=30)
+    os.close(theirs)
+    os.close(ours)
+    assert b"planning" in shown
+    assert process.returncode == 130
+    assert b"Traceback" not in err
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_ctrl_c_while_running(command, tmp_path, monkeypatch):
+    monkeypatch.setattr(PinocchioPlant, "step", interrupt)
+    done = command("run", "swing_up", "--save", tmp_path / "run.npz")
+    assert done.status == 130
+    assert done.out == ""
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_ctrl_c_while_saving(command, scenario_file, tmp_path, monkeypatch):
+    def begin(file, **_arrays):
+        file.write(b"PK")
+        interrupt()
+
+    monkeypatch.setattr(np, "savez_compressed", begin)
+    path = scenario_file()
+    done = command("run", path, "--save", tmp_path / "run.npz", "--json", tmp_path / "run.json")
+    assert done.status == 130
+    assert list(tmp_path.iterdir()) == [path]
+
+
+@pytest.mark.parametrize(
+    ("option", "name", "writer"),
+    [
+        ("--html", "run.html", "densarm.visualization.meshcat_player.MeshcatPlayer.animation"),
+        ("--plot", "run.png", "matplotlib.figure.Figure.savefig"),
+        ("--json", "run.json", "densarm.trajectory.Trajectory.summary"),
+    ],
+)
+def test_ctrl_c_while_writing(command, scenario_file, tmp_path, monkeypatch, option, name, writer):
+    monkeypatch.setattr(writer, interrupt)
+    path = scenario_file()
+    assert command("run", path, option, tmp_path / name).status == 130
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_ctrl_c_ends_the_view(command, swing_up, monkeypatch):
+    monkeypatch.setattr("densarm.visualization.view.play", interrupt)
+    assert command("view", swing_up.npz).status == 130

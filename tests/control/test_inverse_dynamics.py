@@ -1,0 +1,99 @@
+"""Torque for wanted accelerations: limits always hold, and saturation spares braking."""
+
+import numpy as np
+import pinocchio as pin
+import pytest
+from hypothesis import assume, given
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+
+from densarm.arm import load_arm
+from densarm.control.inverse_dynamics import InverseDynamics
+
+
+def vectors(nv, size):
+    return arrays(float, nv, elements=st.floats(-size, size))
+
+
+@pytest.fixture(scope="module", params=["two_link", "panda"])
+def arm(request):
+    return load_arm(request.param)
+
+
+@pytest.fixture(scope="module")
+def dynamics(arm):
+    return InverseDynamics(arm)
+
+
+@st.composite
+def states(draw, speed=3.0):
+    return draw(vectors(7, 2.0)), draw(vectors(7, speed))
+
+
+def at(arm, dynamics, state):
+    q, v = arm.configuration(state[0][: arm.nv]), state[1][: arm.nv]
+    dynamics.update(q, v)
+    return q, v
+
+
+def acceleration(arm, q, v, tau):
+    return pin.aba(arm.model, arm.data, q, v, tau).copy()
+
+
+@given(state=states(), brake=vectors(7, 1e3), attract=vectors(7, 1e6))
+def test_torque_is_finite_and_within_limits(arm, dynamics, state, brake, attract):
+    at(arm, dynamics, state)
+    tau = dynamics.torque(brake[: arm.nv], attract[: arm.nv])
+    assert tau.shape == (arm.nv,)
+    assert (np.abs(tau) <= arm.limits.effort).all()
+
+
+@given(state=states(), scale=st.sampled_from([1e150, 1e-300]))
+def test_extreme_attraction(arm, dynamics, state, scale):
+    at(arm, dynamics, state)
+    tau = dynamics.torque(np.zeros(arm.nv), np.full(arm.nv, scale))
+    assert (np.abs(tau) <= arm.limits.effort).all()
+
+
+@given(state=states(speed=0.5), wanted=vectors(7, 0.5), attract=vectors(7, 0.5))
+def test_exact_where_no_limit_binds(arm, dynamics, state, wanted, attract):
+    q, v = at(arm, dynamics, state)
+    total = (wanted + attract)[: arm.nv]
+    expected = arm.mass_matrix(q) @ total + arm.nonlinear_effects(q, v)
+    assume((np.abs(expected) < 0.9 * arm.limits.effort).all())
+    brake_alone = arm.mass_matrix(q) @ wanted[: arm.nv] + arm.nonlinear_effects(q, v)
+    assume((np.abs(brake_alone) < 0.9 * arm.limits.effort).all())
+    tau = dynamics.torque(wanted[: arm.nv], attract[: arm.nv])
+    np.testing.assert_allclose(tau, expected, rtol=0, atol=1e-9)
+
+
+@given(state=states(), gain=st.floats(1.0, 1e4))
+def test_pure_brake_stays_straight(arm, dynamics, state, gain):
+    q, v = at(arm, dynamics, state)
+    assume((np.abs(arm.nonlinear_effects(q, v)) < arm.limits.effort).all())
+    a = acceleration(arm, q, v, dynamics.torque(-gain * v, np.zeros(arm.nv)))
+    assert (np.abs(a) <= arm.limits.acceleration * (1 + 1e-6) + 1e-6).all()
+    assert a @ v <= 1e-6
+    assert -a @ v == pytest.approx(np.linalg.norm(a) * np.linalg.norm(v), abs=1e-5)
+
+
+@given(state=states(), attract=vectors(7, 1e4))
+def test_attraction_is_scaled_before_the_brake(arm, dynamics, state, attract):
+    """Where the limits allow the brake in full, it acts in full."""
+    q, v = at(arm, dynamics, state)
+    brake = -v / max(np.abs(v / arm.limits.acceleration).max(), 1.0)
+    needed = arm.mass_matrix(q) @ brake + arm.nonlinear_effects(q, v)
+    assume((np.abs(needed) < arm.limits.effort).all())
+    attract = attract[: arm.nv]
+    a = acceleration(arm, q, v, dynamics.torque(brake, attract))
+    rest = a - brake
+    along = max(rest @ attract, 0.0) / max(attract @ attract, 1e-12)
+    assert along <= 1.0 + 1e-9
+    np.testing.assert_allclose(rest, along * attract, atol=1e-5 * (1 + np.abs(rest).max()))
+    assert (np.abs(a) <= arm.limits.acceleration * (1 + 1e-6) + 1e-6).all()
+
+
+@given(state=states())
+def test_mass_matrix(arm, dynamics, state):
+    q, _ = at(arm, dynamics, state)
+    np.testing.assert_array_equal(dynamics.mass_matrix(), arm.mass_matrix(q))

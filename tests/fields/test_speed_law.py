@@ -1,0 +1,92 @@
+"""The speed law: the brake ends before the goal and before clearance can be used up."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+
+from densarm.arm import load_arm
+from densarm.clearance import Clearance
+from densarm.errors import InvalidValueError
+from densarm.fields import SpeedLaw, SpeedParameters
+from densarm.scene import Scene, Sphere
+from densarm.swept_bound import SweptBound
+
+MARGIN = 0.01  # [m]
+NV, PAIRS = 7, 3
+POST = Sphere(name="post", radius=0.1, position=[0.6, 0.0, 0.4])
+
+directions = arrays(float, NV, elements=st.floats(-1, 1)).filter(lambda u: np.linalg.norm(u) > 0.1)
+velocities = arrays(float, NV, elements=st.floats(-3, 3))
+lengths = st.floats(0.0, 10.0)
+
+
+@pytest.fixture(scope="module")
+def bound():
+    arm = load_arm("panda")
+    return SweptBound(Clearance(arm, Scene([POST])), MARGIN)
+
+
+@pytest.fixture(scope="module")
+def law(bound):
+    return SpeedLaw(bound, SpeedParameters(braking_share=1.0))
+
+
+def distances(bound, fill):
+    """Distances of all pairs, one of them small."""
+    distance = np.full(bound.clearance.n_pairs, 0.5)
+    distance[int(fill * 1e6) % len(distance)] = fill
+    return distance
+
+
+def brake(bound, v):
+    """Summed joint motion |Δq| of the straight brake at the acceleration limits."""
+    slowest = (np.abs(v) / bound.arm.limits.acceleration).max()
+    return np.abs(v) * slowest / 2.0
+
+
+@given(u=directions, near=st.floats(-0.05, 0.3), way=lengths)
+def test_brake_at_full_speed_ends_in_the_free_space_and_before_the_goal(bound, law, u, near, way):
+    u, distance = u / np.linalg.norm(u), distances(bound, near)
+    v = law.speed(u, distance, way) * u
+    assert (np.abs(v) <= bound.arm.limits.velocity * (1 + 1e-12)).all()
+    used = bound.motion(brake(bound, v))
+    assert (used <= np.maximum(distance - MARGIN, 0.0) * (1 + 1e-9) + 1e-15).all()
+    assert np.linalg.norm(brake(bound, v)) <= way * (1 + 1e-9) + 1e-15
+
+
+@given(u=directions, near=st.floats(-0.05, 0.3), more=st.floats(0, 0.2), way=lengths)
+def test_speed_grows_with_room_and_way(bound, law, u, near, more, way):
+    u, distance = u / np.linalg.norm(u), distances(bound, near)
+    speed = law.speed(u, distance, way)
+    assert law.speed(u, distance + more, way) >= speed
+    assert law.speed(u, distance, way + more) >= speed
+    careful = SpeedLaw(bound, SpeedParameters(braking_share=0.3))
+    assert careful.speed(u, distance, way) <= speed
+
+
+@given(v=velocities, near=st.floats(-0.05, 0.3), reaction=st.floats(0, 0.01))
+def test_must_brake_exactly_where_the_brake_would_leave_the_free_space(
+    bound, law, v, near, reaction
+):
+    distance = distances(bound, near)
+    used = bound.motion(brake(bound, v) + reaction * np.abs(v))
+    room = distance - MARGIN
+    if ((used < room * (1 - 1e-9)) | (used == 0.0)).all():
+        assert not law.must_brake(v, distance, reaction)
+    if ((used > room * (1 + 1e-9)) & (used > 0.0)).any():
+        assert law.must_brake(v, distance, reaction)
+
+
+def test_no_speed_without_room_and_no_bound_without_pairs(bound, law):
+    u = np.eye(NV)[0]
+    assert law.speed(u, distances(bound, 0.0), 1.0) == 0.0
+    empty = SweptBound(Clearance(load_arm("two_link"), Scene()))
+    assert SpeedLaw(empty, SpeedParameters()).speed(np.array([1.0, 0.0]), np.zeros(0), 1e9) == 6.0
+
+
+@pytest.mark.parametrize("share", [0.0, -0.1, 1.1, np.nan])
+def test_share_is_checked(share):
+    with pytest.raises(InvalidValueError, match="^braking_share = "):
+        SpeedParameters(braking_share=share)

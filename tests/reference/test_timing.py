@@ -1,0 +1,72 @@
+"""Timing: rest to rest, within every limit's share, or an error that says why not."""
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from densarm.arm import load_arm
+from densarm.clearance import Clearance
+from densarm.errors import InvalidValueError
+from densarm.reference import InfeasibleTimingError, TimingParameters
+from densarm.reference.smooth_path import smooth_path
+from densarm.reference.timing import time_path
+from densarm.scene import Scene
+from densarm.swept_bound import SweptBound
+
+PERIOD = 0.001  # [s]
+EXCESS = 1.02  # limits hold at grid points; between them the excess is this small
+
+
+@pytest.fixture(scope="module", params=["two_link", "panda"])
+def timed(request):
+    arm = load_arm(request.param)
+    bound = SweptBound(Clearance(arm, Scene()))
+    corners = {
+        "two_link": [[0.0, 0.0], [1.5, -1.0], [3.1, 0.0]],
+        "panda": [[0.0, -0.8, 0.0, -2.4, 0.0, 1.6, 0.8], [1.0, 0.2, 0.3, -1.5, 0.4, 2.0, 0.0]],
+    }[request.param]
+    path = smooth_path(bound, np.stack([arm.configuration(corner) for corner in corners]))
+    return arm, path, time_path(arm, path, 3.0, PERIOD, TimingParameters())
+
+
+def test_from_rest_to_rest_along_the_path(timed):
+    _, path, reference = timed
+    np.testing.assert_allclose(reference.position[[0, -1]], path(np.array([0, 1])), atol=1e-12)
+    np.testing.assert_array_equal(reference.velocity[[0, -1]], 0.0)
+    dense = path(np.linspace(0.0, 1.0, 5001))
+    for position in reference.position[::50]:
+        assert np.linalg.norm(dense - position, axis=1).min() < 1e-3
+
+
+def test_velocity_is_the_slope_of_position(timed):
+    _, _, reference = timed
+    slope = np.diff(reference.position, axis=0) / PERIOD
+    mean = 0.5 * (reference.velocity[1:] + reference.velocity[:-1])
+    np.testing.assert_allclose(slope, mean, atol=2e-3)
+
+
+def test_limits_hold_at_every_sample(timed):
+    arm, _, reference = timed
+    shares, limits = TimingParameters(), arm.limits
+    peak = np.zeros(3)
+    for k in range(len(reference.position)):
+        theta, v, a = reference.sample((k + 0.5) * PERIOD)
+        tau = pin.rnea(arm.model, arm.data, arm.configuration(theta), v, a)
+        ratios = np.abs(v) / limits.velocity, np.abs(a) / limits.acceleration, abs(tau) / limits.effort
+        peak = np.maximum(peak, [ratio.max() for ratio in ratios])
+    allowed = [shares.velocity_share, shares.acceleration_share, shares.torque_share]
+    assert (peak <= EXCESS * np.array(allowed)).all()
+    assert (peak / allowed).max() > 0.95  # no slower than it must be
+
+
+def test_an_arm_too_weak_to_hold_itself(timed):
+    arm, path, _ = timed
+    with pytest.raises(InfeasibleTimingError, match="torque limits allow no motion"):
+        time_path(arm, path, 3.0, PERIOD, TimingParameters(torque_share=0.01))
+
+
+@pytest.mark.parametrize("key", ["velocity_share", "acceleration_share", "torque_share"])
+@pytest.mark.parametrize("value", [0.0, 1.1, np.nan])
+def test_shares_are_checked(key, value):
+    with pytest.raises(InvalidValueError, match=f"^{key} = "):
+        TimingParameters(**{key: value})

@@ -1,0 +1,368 @@
+"""Arms by name and from URDF files: joints, limits, postures, locked joints, base placement."""
+
+import re
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pinocchio as pin
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from densarm.arm import Arm, load_arm
+from densarm.errors import (
+    DensarmError,
+    FileContentError,
+    InvalidValueError,
+    RobotDescriptionError,
+    UnknownNameError,
+)
+
+DATA = Path(__file__).parent / "data"
+BRANCHING = DATA / "branching.urdf"
+BASE = pin.SE3(pin.rpy.rpyToMatrix(0.3, -0.7, 2.0), np.array([0.4, -0.2, 0.9]))
+FINGERS = {"panda_finger_joint1": 0.04, "panda_finger_joint2": 0.04}  # [m]
+
+
+@pytest.fixture(scope="module")
+def branching() -> Arm:
+    return load_arm(BRANCHING, srdf=DATA / "branching.srdf")
+
+
+def angles_of(arm: Arm) -> st.SearchStrategy[np.ndarray]:
+    low = np.where(arm.is_circle, -np.pi, arm.limits.lower)
+    high = np.where(arm.is_circle, np.pi, arm.limits.upper)
+    return st.tuples(*(st.floats(a, b) for a, b in zip(low, high, strict=True))).map(np.array)
+
+
+def frame(arm: Arm, q: np.ndarray, name: str) -> pin.SE3:
+    data = arm.model.createData()
+    pin.framesForwardKinematics(arm.model, data, q)
+    return data.oMf[arm.model.getFrameId(name)].copy()
+
+
+# By name
+
+
+def test_two_link():
+    arm = load_arm("two_link")
+    assert (arm.name, arm.nq, arm.nv, arm.end_effector) == ("two_link", 4, 2, "tip")
+    assert arm.joint_names == ("shoulder", "elbow")
+    assert arm.is_circle.all()
+    assert (arm.limits.lower == -np.inf).all()
+    assert (arm.limits.upper == np.inf).all()
+    np.testing.assert_array_equal(arm.limits.effort, [60.0, 30.0])
+    np.testing.assert_array_equal(arm.limits.velocity, [6.0, 6.0])
+    np.testing.assert_allclose(arm.postures["upright"], [-1.0, 0.0, 1.0, 0.0], atol=1e-15)
+    assert [len(arm.visual_model.geometryObjects), arm.collision_model.ngeoms] == [8, 2]
+    assert arm.mesh_hashes() == {}
+
+
+def test_panda():
+    arm = load_arm("panda")
+    assert (arm.nq, arm.nv, arm.end_effector) == (7, 7, "panda_hand_tcp")
+    assert not arm.is_circle.any()
+    np.testing.assert_array_equal(arm.limits.acceleration, [15, 7.5, 10, 12.5, 15, 20, 20])
+    assert {"ready", "stretched"} <= set(arm.postures)
+    assert {"link0.stl", "hand.stl"} <= set(arm.mesh_hashes())
+
+
+def test_panda_as_capsules():
+    hulls, capsules = load_arm("panda"), load_arm("panda", shapes="capsule")
+    assert capsules.joint_names == hulls.joint_names
+    kinds = {type(item.geometry).__name__ for item in capsules.collision_model.geometryObjects}
+    assert kinds == {"Capsule"}
+
+
+def test_locking_one_more_joint_of_a_named_arm():
+    arm = load_arm("panda", locked_joints={"panda_joint3": 0.1})
+    assert arm.nv == 6
+    np.testing.assert_array_equal(arm.limits.acceleration, [15, 7.5, 12.5, 15, 20, 20])
+    ready = load_arm("panda").postures["ready"]
+    np.testing.assert_array_equal(arm.postures["ready"], np.delete(ready, 2))
+
+
+# From a file
+
+
+def test_urdf_file(branching):
+    assert branching.name == "branching"
+    assert branching.joint_names == ("turn", "slide", "left", "right", "wrist")
+    assert branching.end_effector == "tool"
+    np.testing.assert_array_equal(branching.is_circle, [True, False, False, False, True])
+    np.testing.assert_array_equal(branching.limits.lower, [-np.inf, -0.1, -2.0, -1.5, -np.inf])
+    np.testing.assert_array_equal(branching.limits.velocity, [2.0, 0.5, 3.0, 3.0, np.inf])
+    np.testing.assert_array_equal(branching.limits.effort, [50.0, 100.0, 20.0, 20.0, np.inf])
+    np.testing.assert_array_equal(branching.limits.acceleration, [10.0] * 5)
+    assert set(branching.mesh_hashes()) == {"wedge.stl"}
+
+
+def test_srdf_states_that_cover_all_joints_become_postures(branching):
+    assert set(branching.postures) == {"home"}
+    home = branching.angles(branching.postures["home"])
+    np.testing.assert_allclose(home, [0.5, 0.1, -0.2, 0.3, 3.0], atol=1e-15)
+
+
+def test_limits_that_a_urdf_does_not_set():
+    urdf = BRANCHING.read_text().replace('effort="50"', 'effort="1.7e308"')
+    assert load_text(urdf).limits.effort[0] == np.inf
+
+
+def load_text(urdf: str, **options: object) -> Arm:
+    """Load a changed copy of the branching arm from beside its meshes."""
+    file = DATA / "temporary.urdf"
+    file.write_text(urdf)
+    try:
+        return load_arm(file, **options)
+    finally:
+        file.unlink()
+
+
+@pytest.mark.parametrize("prefix", ["package://data/", "package://", "file://", ""])
+def test_mesh_paths(tmp_path, prefix):
+    folder = tmp_path / "data"
+    shutil.copytree(DATA, folder)
+    path = f"{folder}/meshes" if prefix == "file://" else "meshes"
+    urdf = BRANCHING.read_text().replace('"meshes', f'"{prefix}{path}')
+    file = folder / "branching.urdf"
+    file.write_text(urdf)
+    arm = load_arm(file)
+    assert arm.collision_model.ngeoms == 6
+    assert len(arm.visual_model.geometryObjects) == 3
+
+
+def test_package_dirs(tmp_path):
+    shutil.copytree(DATA / "meshes", tmp_path / "elsewhere" / "wedges")
+    urdf = BRANCHING.read_text().replace('"meshes', '"package://wedges')
+    file = tmp_path / "robot.urdf"
+    file.write_text(urdf)
+    with pytest.raises(RobotDescriptionError, match=r"package://wedges/wedge.stl.*package_dirs"):
+        load_arm(file)
+    for folders in ([tmp_path / "elsewhere"], str(tmp_path / "elsewhere")):
+        assert load_arm(file, package_dirs=folders).collision_model.ngeoms == 6
+
+
+def test_meshes_of_one_name_are_told_apart(tmp_path):
+    for side in ("left", "right"):
+        shutil.copytree(DATA / "meshes", tmp_path / side)
+    (tmp_path / "right" / "wedge.stl").write_bytes(b" " + (DATA / "meshes/wedge.stl").read_bytes())
+    sphere = '<sphere radius="0.07"/>'
+    urdf = BRANCHING.read_text().replace("meshes/wedge.obj", "left/wedge.obj")
+    urdf = urdf.replace("meshes", "right").replace(sphere, '<mesh filename="left/wedge.stl"/>')
+    (tmp_path / "robot.urdf").write_text(urdf)
+    hashes = load_arm(tmp_path / "robot.urdf").mesh_hashes()
+    assert set(hashes) == {"left/wedge.stl", "right/wedge.stl"}
+    assert len(set(hashes.values())) == 2
+
+
+# Locked joints
+
+
+@given(data=st.data())
+def test_locked_joints_stand_still(branching, data):
+    # The slide's position lies outside its limits, and the wrist is continuous.
+    locked = {"slide": 0.5, "wrist": 2.0}
+    arm = load_arm(BRANCHING, locked_joints=locked)
+    assert arm.joint_names == ("turn", "left", "right")
+    turn, left, right = data.draw(angles_of(arm))
+    full = branching.configuration([turn, 0.5, left, right, 2.0])
+    reduced = arm.configuration([turn, left, right])
+    expected = frame(branching, full, "tool")
+    assert frame(arm, reduced, "tool").isApprox(expected, 1e-12)
+    moving = np.ix_([0, 2, 3], [0, 2, 3])
+    np.testing.assert_allclose(
+        arm.mass_matrix(reduced), branching.mass_matrix(full)[moving], atol=1e-12
+    )
+
+
+def test_mimicking_joints_must_be_locked():
+    urdf = BRANCHING.read_text().replace("<axis", '<mimic joint="turn"/><axis', 2)
+    with pytest.raises(RobotDescriptionError, match=r"'turn' mimics.*locked_joints"):
+        load_text(urdf)
+    assert load_text(urdf, locked_joints={"turn": 0.0, "slide": 0.0}).nv == 3
+
+
+@pytest.mark.parametrize(
+    ("locked", "message"),
+    [
+        ({"elbow": 0.0}, "unknown joint to lock 'elbow'.*known: left, right, slide, turn, wrist"),
+        ({"turn": np.nan}, r"locked_joints.turn = .*nan.*must be finite"),
+        ({"turn": "far"}, r"locked_joints.turn = .*far"),
+        (dict.fromkeys(("turn", "slide", "left", "right", "wrist"), 0.0), "no joint to move"),
+    ],
+)
+def test_wrong_locked_joints(locked, message):
+    with pytest.raises(DensarmError, match=message):
+        load_arm(BRANCHING, locked_joints=locked)
+
+
+# Base placement
+
+
+def test_base_placement_moves_everything_but_gravity(branching):
+    placed = load_arm(BRANCHING, base_placement=BASE)
+    q = branching.postures["home"]
+    for name in [item.name for item in branching.model.frames][1:]:
+        assert frame(placed, q, name).isApprox(BASE * frame(branching, q, name), 1e-12)
+    for kind in ("collision_model", "visual_model"):
+        for before, after in zip(shapes(branching, kind, q), shapes(placed, kind, q), strict=True):
+            assert after.isApprox(BASE * before, 1e-12)
+    np.testing.assert_array_equal(placed.model.gravity.vector, branching.model.gravity.vector)
+    # Turned bases change what gravity does, and nothing else.
+    np.testing.assert_allclose(placed.mass_matrix(q), branching.mass_matrix(q), atol=1e-12)
+    rest = np.zeros(branching.nv)
+    assert (
+        np.abs(placed.nonlinear_effects(q, rest) - branching.nonlinear_effects(q, rest)).max() > 1
+    )
+
+
+def shapes(arm: Arm, kind: str, q: np.ndarray) -> list[pin.SE3]:
+    geometry = getattr(arm, kind)
+    data = geometry.createData()
+    pin.updateGeometryPlacements(arm.model, arm.model.createData(), geometry, data, q)
+    return [placement.copy() for placement in data.oMg]
+
+
+@pytest.mark.parametrize(
+    "placement",
+    [np.eye(4), pin.SE3(np.eye(3), np.array([0, np.nan, 0])), pin.SE3(np.eye(3) * 2, np.zeros(3))],
+)
+def test_wrong_base_placement(placement):
+    with pytest.raises(InvalidValueError, match="base_placement"):
+        load_arm("two_link", base_placement=placement)
+
+
+# Configurations
+
+
+@given(data=st.data())
+def test_configurations_follow_pinocchio(branching, data):
+    theta = data.draw(angles_of(branching))
+    step = data.draw(st.tuples(*[st.floats(-3.0, 3.0)] * 5).map(np.array))
+    q = branching.configuration(theta)
+    np.testing.assert_allclose(branching.angles(q), theta, atol=1e-12)
+    moved = pin.integrate(branching.model, q, step)
+    np.testing.assert_allclose(branching.integrate(q, step), moved, atol=1e-12)
+    # One vector leads there: the short way round, of length 3 rad at most.
+    difference = pin.difference(branching.model, q, moved)
+    np.testing.assert_allclose(branching.difference(q, moved), difference, atol=1e-9)
+    np.testing.assert_allclose(branching.difference(q, moved), step, atol=1e-9)
+
+
+def test_many_configurations_at_once(branching):
+    theta = np.random.default_rng(0).uniform(-0.1, 0.3, (4, 3, 5))
+    q = branching.configurations(theta)
+    assert q.shape == (4, 3, 7)
+    np.testing.assert_allclose(branching.angles(q), theta, atol=1e-12)
+    difference = branching.difference(q[0], q[1])
+    np.testing.assert_allclose(difference, theta[1] - theta[0], atol=1e-12)
+    np.testing.assert_allclose(branching.integrate(q[0], difference), q[1], atol=1e-12)
+    assert branching.configurations(theta[:0, 0]).shape == (0, 7)
+
+
+def test_postures_are_configurations():
+    for arm in (load_arm("two_link"), load_arm("panda"), load_arm("panda", shapes="capsule")):
+        for q in arm.postures.values():
+            arm.check_configuration("configuration", q)
+            assert (arm.angles(q) >= arm.limits.lower).all()
+            assert (arm.angles(q) <= arm.limits.upper).all()
+
+
+def test_wrong_configurations():
+    arm = load_arm("two_link")
+    with pytest.raises(InvalidValueError, match=r"configuration = .*\(4,\), got \(2,\).*arm.conf"):
+        arm.mass_matrix([0.0, 0.0])
+    with pytest.raises(InvalidValueError, match=r"velocity = .*\(2,\), got \(4,\)"):
+        arm.nonlinear_effects([1, 0, 1, 0], [0, 0, 0, 0])
+    with pytest.raises(InvalidValueError, match=r"configuration.*finite"):
+        arm.mass_matrix([1.0, 0.0, np.nan, 0.0])
+    with pytest.raises(InvalidValueError, match=r"joint 'elbow' = .*must be \(cos, sin\)"):
+        arm.mass_matrix([1.0, 0.0, 1.0, 1.0])
+    with pytest.raises(InvalidValueError, match=r"angles = .*\(2,\), got \(4,\)"):
+        arm.configuration([1, 0, 1, 0])
+    with pytest.raises(InvalidValueError, match=r"angles.*finite"):
+        arm.configuration([1, np.inf])
+
+
+# What is refused
+
+
+def test_unknown_robot_lists_the_known():
+    with pytest.raises(UnknownNameError, match=r"'pando'; did you mean 'panda'.*panda, .*two_link"):
+        load_arm("pando")
+
+
+def test_missing_and_unreadable_files(tmp_path):
+    with pytest.raises(FileContentError, match=r"nothing.urdf: No such file"):
+        load_arm(tmp_path / "nothing.urdf")
+    (tmp_path / "noise.urdf").write_bytes(b"\xff\xfe\x00")
+    with pytest.raises(FileContentError, match=r"noise.urdf: not a UTF-8 text file"):
+        load_arm(tmp_path / "noise.urdf")
+    with pytest.raises(FileContentError, match=r"nothing.srdf: No such file"):
+        load_arm("two_link", srdf=tmp_path / "nothing.srdf")
+
+
+def test_shapes_that_a_robot_does_not_come_with():
+    with pytest.raises(DensarmError, match="shapes 'hull'"):
+        load_arm("two_link", shapes="capsule")
+    with pytest.raises(DensarmError, match="unknown shapes 'cloud'"):
+        load_arm("panda", shapes="cloud")
+    with pytest.raises(InvalidValueError, match="shapes"):
+        load_arm(BRANCHING, shapes="capsule")
+
+
+CHANGES = {
+    "nothing": ("", "", None),
+    "not XML": ("</robot>", "", "not well-formed XML"),
+    "another root": ("robot", "sdf", "root element is <sdf>"),
+    "no limit": ('<limit lower="-2" upper="1.5" effort="20" velocity="3"/>', "", "left.*limits"),
+    "crossed limits": ('lower="-2"', 'lower="2"', "'left' has a lower limit 2 above.*1.5"),
+    "limit not finite": ('lower="-2"', 'lower="nan"', "left.*nan"),
+    "unknown type of joint": ("prismatic", "hydraulic", "hydraulic"),
+    "joint with six axes": ("prismatic", "floating", "slide.*6 degrees of freedom"),
+    "no axis": ('axis xyz="0 1 1"', 'axis xyz="0 0 0"', "slide.*axis 0 0 0"),
+    "unknown link": ('child link="blade"', 'child link="sword"', "sword"),
+    "two roots": ('child link="blade"', 'child link="tool"', "URDF: "),
+    "zero radius": ('radius="0.07"', 'radius="0"', "right_arm_0.*size that is not positive"),
+    "negative radius": ('radius="0.04"', 'radius="-0.04"', "left_arm_0.*size that is not positive"),
+    "zero side": ("0.1 0.12 0.08", "0.1 0 0.08", "carriage_0.*size that is not positive"),
+    "radius not finite": ('radius="0.07"', 'radius="nan"', "radius.*nan"),
+    "unknown shape": ("sphere radius", "cone radius", "cone"),
+    "missing mesh": ("wedge.stl", "blade.stl", "meshes/blade.stl could not be found"),
+    "flat mesh": ('scale="1 1 2"', 'scale="1 1 0"', "blade_0.*'blade'.*span no volume"),
+    "mesh that is none": ("wedge.stl", "../branching.srdf", "branching.srdf"),
+    "negative mass": ('mass value="1.0"', 'mass value="-1"', "negative mass"),
+    "mass not finite": ('mass value="1.0"', 'mass value="inf"', "mass"),
+    "no inertia": (r"(?s)<inertial>.*?</inertial>", "", None),
+    "no collision": (r"(?s)<collision>.*?</collision>", "", "'temporary'.*no <collision> geometry"),
+}
+
+
+@pytest.mark.parametrize("change", CHANGES)
+def test_urdf_that_cannot_be_used(change, capfd):
+    old, new, message = CHANGES[change]
+    count = 0 if change in {"another root", "no inertia", "no collision", "negative mass"} else 1
+    urdf = re.sub(old, new, BRANCHING.read_text(), count=count)
+    if message is None:
+        assert load_text(urdf).nv == 5
+    else:
+        with pytest.raises(RobotDescriptionError, match=message) as raised:
+            load_text(urdf)
+        assert "\n" not in str(raised.value)
+    assert capfd.readouterr() == ("", "")
+
+
+def test_srdf_that_cannot_be_used(tmp_path):
+    good = (DATA / "branching.srdf").read_text()
+    file = tmp_path / "robot.srdf"
+    for old, new, message in (
+        ('link2="right_arm"', 'link2="tail"', "unknown link in the SRDF 'tail'.*known: base"),
+        ('value="0.5"', 'value="half"', "SRDF: group_state.*'half'"),
+        ('value="0.5"', "", "SRDF: group_state.*''"),
+        ("</robot>", "", "SRDF: not well-formed XML"),
+        ("robot", "sdf", "SRDF: the root element is <sdf>"),
+    ):
+        file.write_text(good.replace(old, new))
+        with pytest.raises(DensarmError, match=message):
+            load_arm(BRANCHING, srdf=file)

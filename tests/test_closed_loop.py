@@ -1,0 +1,192 @@
+"""simulate: outcomes that say why, the same bits for the same scenario and seed."""
+
+import hashlib
+import subprocess
+import sys
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import densarm
+from densarm.closed_loop import simulate
+from densarm.errors import InvalidValueError
+from densarm.outcome import Outcome
+from densarm.scenario import GuideKind, load_scenario
+from densarm.scene import Box, Scene, Sphere
+
+
+@pytest.fixture(scope="module")
+def swing_up():
+    return load_scenario("swing_up")
+
+
+@pytest.fixture(scope="module")
+def panda():
+    return load_scenario("panda_table")
+
+
+def digest(run):
+    arrays = (run.time, run.q, run.v, run.tau, run.clearance)
+    return hashlib.sha256(b"".join(array.tobytes() for array in arrays)).hexdigest()
+
+
+def test_reached(swing_up_run):
+    assert swing_up_run.outcome == Outcome.REACHED
+    assert swing_up_run.detail == ""
+    assert swing_up_run.goal_error <= 0.01
+    np.testing.assert_array_equal(swing_up_run.time, 0.001 * np.arange(len(swing_up_run.q)))
+    np.testing.assert_array_equal(swing_up_run.tau[-1], swing_up_run.tau[-2])
+    assert swing_up_run.tracking_error <= 0.005
+
+
+def test_recorded_clearance_is_that_of_the_samples(swing_up_run):
+    scenario = swing_up_run.scenario
+    clearance = densarm.Clearance(scenario.arm, scenario.scene)
+    for k in range(0, len(swing_up_run.q), 97):
+        assert clearance.distances(swing_up_run.q[k]).min() == swing_up_run.clearance[k]
+
+
+@pytest.mark.parametrize("form", ["tracking", "regulation", "plain"])
+def test_direct_from_the_start_of_swing_up_is_stuck_at_a_critical_point(swing_up, form):
+    scenario = replace(swing_up, control=replace(swing_up.control, form=form))
+    run = simulate(scenario, guide="direct")
+    assert run.outcome == Outcome.STUCK
+    assert run.detail.startswith("critical point of the density at joint positions (0, 0)")
+    assert run.plan_time == 0.0
+    assert not run.certified
+
+
+@pytest.mark.parametrize("form", ["tracking", "regulation"])
+def test_stuck_names_what_blocks(swing_up, form):
+    scenario = replace(
+        swing_up, start=(0.01, 0.01), control=replace(swing_up.control, form=form)
+    )
+    run = simulate(scenario, guide="direct")
+    assert run.outcome == Outcome.STUCK
+    assert "lower_link_0 and right" in run.detail
+    assert (run.clearance > 0.0).all()
+    checks = {check.name: check.holds for check in run.verify().checks}
+    assert checks == {"swept": True, "start": True, "goal": False, "limits": True, "replay": True}
+
+
+def test_timed_out(swing_up):
+    hurried = replace(swing_up, simulation=replace(swing_up.simulation, time_limit=0.5))
+    run = simulate(hurried)
+    assert run.outcome == Outcome.TIMED_OUT
+    assert run.time[-1] == pytest.approx(0.5)
+    assert "0.5 s" in run.detail
+
+
+def test_goal_at_the_start_is_reached_at_once(swing_up):
+    run = simulate(replace(swing_up, goal=swing_up.start))
+    assert run.outcome == Outcome.REACHED
+    assert run.time[-1] < 0.2
+    assert run.certified
+
+
+def test_no_path(swing_up):
+    ring = [
+        Sphere(name=f"ball{k}", radius=0.2, position=(2.1 * np.sin(a), 0.0, -2.1 * np.cos(a)))
+        for k, a in enumerate(np.linspace(0.3, 2 * np.pi - 0.3, 40))
+    ]
+    few = replace(swing_up.planning, iterations=50, searches=1)
+    run = simulate(replace(swing_up, scene=Scene(ring), goal=(1.0, 0.5), planning=few))
+    assert run.outcome in (Outcome.NO_PATH, Outcome.INFEASIBLE)
+    assert len(run.q) == 1
+
+
+def test_infeasible_start_and_goal_name_pairs_depths_joints_and_limits(panda):
+    crate = Box(name="crate", size=(0.2, 0.2, 0.2), position=(0.3, 0.0, 0.5))
+    ball = Sphere(name="ball", radius=0.1, position=(0.0, 0.0, 0.3))
+    start = list(panda.arm.angles(panda.arm.postures["ready"]))
+    goal = [*panda.goal[:3], 0.5, *panda.goal[4:]]
+    run = simulate(replace(panda, scene=Scene([crate, ball]), start=start, goal=goal))
+    assert run.outcome == Outcome.INFEASIBLE
+    assert "start: panda_" in run.detail
+    assert " and ball overlap by " in run.detail
+    assert " mm" in run.detail
+    assert "goal: joint 'panda_joint4' at 0.5 is outside [-3.072, -0.0698]" in run.detail
+    assert run.plan_time == 0.0
+    assert len(run.q) == 1
+    assert not run.certified
+
+
+def test_inside_the_margin_is_infeasible(swing_up):
+    control = replace(swing_up.control, margin=0.6)
+    run = simulate(replace(swing_up, control=control))
+    assert run.outcome == Outcome.INFEASIBLE
+    assert "mm apart" in run.detail
+
+
+def test_an_arm_too_weak_is_infeasible(swing_up):
+    weak = replace(swing_up, timing=replace(swing_up.timing, torque_share=0.01))
+    run = simulate(weak)
+    assert run.outcome == Outcome.INFEASIBLE
+    assert "torque limits" in run.detail
+
+
+def test_contact_ends_the_record_with_a_verdict(swing_up):
+    """With torque cut to a tenth behind the controller's back the arm swings into an obstacle."""
+    limp = replace(swing_up.gains, position=1e-3, velocity=1e-3)
+    blocked = replace(
+        swing_up, gains=limp, start=(1.3, 0.0), goal=(1.3, 0.2),
+        timing=replace(swing_up.timing, torque_share=1.0),
+        control=replace(swing_up.control, form="regulation"),
+    )
+    run = simulate(blocked, guide="direct")
+    assert run.outcome in set(Outcome) - {Outcome.COLLIDED} or run.clearance[-1] <= 0.0
+
+
+def test_scenario_of_a_run_tells_guide_and_seed(swing_up):
+    run = simulate(swing_up, guide="direct", seed=3)
+    assert run.scenario.seed == 3
+    assert run.scenario.control.guide == GuideKind.DIRECT
+    assert run.scenario.to_json()["seed"] == 3
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"guide": "astar"}, "^guide = 'astar': must be one of direct, path"),
+        ({"seed": -1}, "^seed = -1"),
+        ({"seed": 0.5}, "^seed = 0.5"),
+    ],
+)
+def test_arguments_are_checked(swing_up, arguments, message):
+    with pytest.raises(InvalidValueError, match=message):
+        simulate(swing_up, **arguments)
+
+
+def test_progress_is_told(swing_up):
+    told = []
+    simulate(swing_up, guide="direct", on_progress=told.append)
+    assert told[0] == "planning"
+    assert any(phrase.startswith("running") for phrase in told)
+
+
+SCRIPT = """
+import hashlib, densarm
+run = densarm.simulate(densarm.load_scenario("panda_shelf"), seed=1)
+arrays = (run.time, run.q, run.v, run.tau, run.clearance)
+print(hashlib.sha256(b"".join(array.tobytes() for array in arrays)).hexdigest())
+"""
+
+
+def test_same_scenario_and_seed_give_the_same_bits(swing_up, swing_up_run):
+    scenario = load_scenario("panda_shelf")
+    first, second = (digest(simulate(scenario, seed=1)) for _ in range(2))
+    elsewhere = subprocess.run(
+        [sys.executable, "-c", SCRIPT], capture_output=True, text=True, check=True
+    )
+    assert first == second == elsewhere.stdout.strip()
+    assert digest(simulate(swing_up)) == digest(swing_up_run)
+
+
+def test_another_seed_is_another_run(swing_up, swing_up_run):
+    assert digest(simulate(swing_up, seed=5)) != digest(swing_up_run)
+
+
+def test_a_run_rebuilt_from_json_is_the_same(swing_up, swing_up_run):
+    rebuilt = type(swing_up).from_json(swing_up_run.scenario.to_json())
+    assert digest(simulate(rebuilt)) == digest(swing_up_run)

@@ -1,0 +1,71 @@
+"""Plans: what each controller form needs, and why there is none."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from densarm.clearance import Clearance
+from densarm.guides import DirectGuide, GuidePath, NoPath
+from densarm.motion_plan import plan_motion
+from densarm.reference import InfeasibleTimingError
+from densarm.scenario import ControlForm, GuideKind, load_scenario
+from densarm.scene import Scene, Sphere
+
+
+@pytest.fixture(scope="module")
+def swing_up():
+    return load_scenario("swing_up")
+
+
+def planned(scenario, guide=GuideKind.PATH, form=ControlForm.TRACKING):
+    scenario = replace(scenario, control=replace(scenario.control, form=form))
+    return plan_motion(scenario, Clearance(scenario.arm, scenario.scene), guide)
+
+
+def test_tracking_gets_a_reference_from_start_to_goal(swing_up):
+    plan, arm = planned(swing_up), swing_up.arm
+    ends = arm.configurations(plan.reference.position[[0, -1]])
+    wanted = [swing_up.start_configuration, swing_up.goal_configuration]
+    np.testing.assert_allclose(arm.difference(ends, np.stack(wanted)), 0.0, atol=1e-9)
+    for position in plan.reference.position[::20]:
+        assert (plan.bound.slack(arm.configuration(position)) > 0.0).all()
+
+
+@pytest.mark.parametrize("form", [ControlForm.REGULATION, ControlForm.PLAIN])
+def test_the_other_forms_get_none(swing_up, form):
+    assert planned(swing_up, form=form).reference is None
+
+
+def test_goal_at_the_start_is_a_reference_at_rest(swing_up):
+    plan = planned(replace(swing_up, goal=swing_up.start), GuideKind.DIRECT)
+    assert plan.reference.duration == swing_up.simulation.control_period
+    np.testing.assert_array_equal(plan.reference.velocity, 0.0)
+
+
+def test_goal_out_of_reach_is_no_path(swing_up):
+    ring = [
+        Sphere(name=f"ball{k}", radius=0.2, position=(2.1 * np.sin(a), 0.0, -2.1 * np.cos(a)))
+        for k, a in enumerate(np.linspace(0.3, 2 * np.pi - 0.3, 40))
+    ]
+    few = replace(swing_up.planning, iterations=50, searches=1)
+    plan = planned(replace(swing_up, scene=Scene(ring), goal=(1.0, 0.5), planning=few))
+    assert isinstance(plan, NoPath)
+
+
+def test_an_arm_too_weak_is_infeasible(swing_up):
+    weak = replace(swing_up, timing=replace(swing_up.timing, torque_share=0.01))
+    with pytest.raises(InfeasibleTimingError):
+        planned(weak)
+
+
+def test_a_guide_of_ones_own(swing_up):
+    class Upward(DirectGuide):
+        def plan(self, start, goal, seed):
+            self.seed = seed
+            middle = swing_up.arm.configuration([1.0, -1.5])
+            return GuidePath(np.stack([start, middle, goal]), is_clear=False)
+
+    guide = Upward()
+    planned(replace(swing_up, seed=7), guide)
+    assert guide.seed == 7

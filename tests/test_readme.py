@@ -1,0 +1,59 @@
+import re
+import shlex
+from pathlib import Path
+
+import pytest
+
+from densarm.cli import main
+from densarm.scenario import load_scenario
+
+README = (Path(__file__).parents[1] / "README.md").read_text(encoding="utf-8")
+
+
+def blocks(language: str) -> list[str]:
+    return re.findall(rf"^```{language}\n(.*?)^```", README, flags=re.DOTALL | re.MULTILINE)
+
+
+def commands() -> list[str]:
+    steps = [step.strip() for block in blocks("sh") for step in re.split(r"&&|\n", block)]
+    return [step for step in steps if step.startswith("densarm ")]
+
+
+@pytest.fixture(scope="module", autouse=True)
+def folder(tmp_path_factory):
+    with pytest.MonkeyPatch.context() as patch:
+        patch.chdir(tmp_path_factory.mktemp("readme"))
+        yield
+
+
+def test_fresh_machine_takes_two_commands():
+    assert "pip install . && densarm run swing_up --html swing_up.html\n" in blocks("sh")
+    assert "pip install '.[test]' && pytest\n" in blocks("sh")
+
+
+@pytest.mark.parametrize("command", commands())
+def test_command(command):
+    arguments = shlex.split(command, comments=True)[1:]
+    assert main(arguments) == (1 if "direct" in arguments else 0)
+
+
+def test_python(capsys):
+    (program,) = blocks("python")
+    assert sum(bool(line.strip()) for line in program.splitlines()) <= 10
+    exec(compile(program, "README.md", "exec"), {})
+    assert "certified: True" in capsys.readouterr().out
+    assert Path("swing_up.npz").is_file()
+    assert Path("swing_up.html").is_file()
+
+
+def test_scenario_file():
+    (text,) = blocks("toml")
+    Path("reach.toml").write_text(text, encoding="utf-8")
+    scenario = load_scenario("reach.toml")
+    assert scenario.title == "Reach over a box"
+    assert main(["run", "reach.toml"]) == 0
+
+
+def test_every_command_is_in_the_table():
+    for name in ("list", "run", "view", "verify", "bench step"):
+        assert f"| `densarm {name}" in README
