@@ -10,6 +10,7 @@ if TYPE_CHECKING:
     from densarm.arm import Arm, JointLimits, load_arm
     from densarm.certificates.certificate import Certificate, Check
     from densarm.clearance import Clearance, ClearanceSample
+    from densarm.closed_loop import make_controller, simulate
     from densarm.control.controller import Controller
     from densarm.control.density_feedback import DensityFeedback
     from densarm.control.density_regulation import DensityRegulation
@@ -48,7 +49,6 @@ if TYPE_CHECKING:
         load_scenario,
     )
     from densarm.scene import Box, Capsule, Cylinder, Scene, Sphere
-    from densarm.closed_loop import make_controller, simulate
     from densarm.simulation.fixed_step_loop import SimulationParameters
     from densarm.simulation.plant import Integrator, PinocchioPlant
     from densarm.swept_bound import SweptBound

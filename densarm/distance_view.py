@@ -43,7 +43,7 @@ class DistanceView:
         addresses = [result.normal.__array_interface__["data"][0] for result in self._results]
         steps = np.diff(addresses)
         stride = int(steps[0]) if len(steps) else _FIELDS * 8
-        if (steps != stride).any() or stride < _FIELDS * 8 or stride % 8:
+        if (steps != stride).any() or stride < _FIELDS * 8 or stride % 8 != 0:
             return None
         count = (stride // 8) * (len(addresses) - 1) + _FIELDS
         memory = (ctypes.c_double * count).from_address(addresses[0] - 8)

@@ -112,7 +112,7 @@ class Scenario:
         for key in ("start", "goal"):
             object.__setattr__(self, key, finite_tuple(key, getattr(self, key), self.arm.nv))
         non_negative_integer("seed", self.seed)
-        _check_feedback(self.density)
+        _check_feedback(self.control.form, self.density)
 
     @property
     def start_configuration(self) -> Array:
@@ -232,16 +232,21 @@ def _parse(path: Path, data: dict[str, Any]) -> Scenario:
     )
 
 
-def _check_feedback(density: DensityParameters) -> None:
-    """Refuse a density whose gradient is singular or flat at the goal and not blended there."""
-    smooth = density.gauge == Gauge.RECIPROCAL and density.alpha == 1.0
-    if not smooth and density.blend_radius == 0.0:
-        raise InvalidValueError(
-            "density.blend_radius",
-            density.blend_radius,
-            f"above 0 in gauge {str(density.gauge)!r} with alpha = {density.alpha:g}, whose "
-            "gradient is singular or flat at the goal (or use gauge 'reciprocal', alpha = 1)",
-        )
+def _check_feedback(form: ControlForm, density: DensityParameters) -> None:
+    """Refuse a density whose gradient is singular or flat where the controller needs it.
+
+    Tracking lives at e = 0, where a blend would leave nothing of the obstacles.
+    """
+    if density.gauge == Gauge.RECIPROCAL and density.alpha == 1.0:
+        return
+    reason = (
+        f"in gauge {str(density.gauge)!r} with alpha = {density.alpha:g}, whose gradient is "
+        "singular or flat at the goal (or use gauge 'reciprocal', alpha = 1)"
+    )
+    if form == ControlForm.TRACKING:
+        raise InvalidValueError("control.form", str(form), f"'regulation' or 'plain' {reason}")
+    if density.blend_radius == 0.0:
+        raise InvalidValueError("density.blend_radius", 0.0, f"above 0 {reason}")
 
 
 @dataclass(frozen=True)

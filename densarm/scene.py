@@ -9,7 +9,7 @@ import numpy as np
 import pinocchio as pin
 
 from densarm.errors import InvalidValueError, UnknownNameError
-from densarm.shapes import circumscribed_cylinder
+from densarm.shapes import box_hull, circumscribed_cylinder
 from densarm.validation import finite_tuple, positive, unit_quaternion
 
 Vector3 = tuple[float, ...]
@@ -82,8 +82,8 @@ class Box:
         object.__setattr__(self, "size", tuple(positive(f"{self.name}.size", s) for s in size))
 
     def geometry(self) -> coal.CollisionGeometry:
-        """Return coal's box."""
-        return coal.Box(*self.size)
+        """Return the hull of the corners, since coal's box errs where it nearly touches another."""
+        return box_hull(self.size)
 
 
 @dataclass(frozen=True, kw_only=True)

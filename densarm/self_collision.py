@@ -38,8 +38,8 @@ def add_self_collision_pairs(
         joints = {geometry.geometryObjects[k].parentJoint for k in (i, j)}
         if not _are_neighbours(model, joints) and frozenset((links[i], links[j])) not in disabled:
             geometry.addCollisionPair(pin.CollisionPair(i, j))
-    for pair in _always_colliding(model, geometry):
-        geometry.removeCollisionPair(pair)
+    for first, second in _always_colliding(model, geometry):
+        geometry.removeCollisionPair(pin.CollisionPair(first, second))
 
 
 def srdf_postures(srdf: str | None) -> dict[str, dict[str, float]]:
@@ -91,7 +91,7 @@ def _disabled_links(model: pin.Model, srdf: str) -> set[frozenset[str]]:
     return disabled
 
 
-def _always_colliding(model: pin.Model, geometry: pin.GeometryModel) -> list[pin.CollisionPair]:
+def _always_colliding(model: pin.Model, geometry: pin.GeometryModel) -> list[tuple[int, int]]:
     pairs = list(geometry.collisionPairs)
     data, geometry_data = model.createData(), geometry.createData()
     random = np.random.default_rng(0)
@@ -103,7 +103,8 @@ def _always_colliding(model: pin.Model, geometry: pin.GeometryModel) -> list[pin
         pin.updateGeometryPlacements(model, data, geometry, geometry_data, q)
         for k in np.flatnonzero(colliding):
             colliding[k] = pin.computeCollision(geometry, geometry_data, int(k))
-    return [pair for pair, always in zip(pairs, colliding, strict=True) if always]
+    # Pinocchio's own pairs are references into a vector that shifts when one is removed.
+    return [(pair.first, pair.second) for pair, always in zip(pairs, colliding, strict=True) if always]
 
 
 def _random_configuration(model: pin.Model, random: np.random.Generator) -> Array:

@@ -11,6 +11,7 @@ import pytest
 import densarm
 from densarm.closed_loop import simulate
 from densarm.errors import InvalidValueError
+from densarm.motion_plan import plan_motion
 from densarm.outcome import Outcome
 from densarm.scenario import GuideKind, load_scenario
 from densarm.scene import Box, Scene, Sphere
@@ -59,15 +60,26 @@ def test_direct_from_the_start_of_swing_up_is_stuck_at_a_critical_point(swing_up
 
 @pytest.mark.parametrize("form", ["tracking", "regulation"])
 def test_stuck_names_what_blocks(swing_up, form):
-    scenario = replace(
-        swing_up, start=(0.01, 0.01), control=replace(swing_up.control, form=form)
-    )
+    scenario = replace(swing_up, start=(0.01, 0.01), control=replace(swing_up.control, form=form))
     run = simulate(scenario, guide="direct")
     assert run.outcome == Outcome.STUCK
     assert "lower_link_0 and right" in run.detail
     assert (run.clearance > 0.0).all()
     checks = {check.name: check.holds for check in run.verify().checks}
     assert checks == {"swept": True, "start": True, "goal": False, "limits": True, "replay": True}
+
+
+@pytest.mark.parametrize("gauge", ["density", "log"])
+def test_regulation_in_the_other_gauges_reaches_by_the_blend(swing_up, gauge):
+    scenario = replace(
+        swing_up,
+        control=replace(swing_up.control, form="regulation"),
+        density=replace(swing_up.density, gauge=gauge, blend_radius=0.05),
+        simulation=replace(swing_up.simulation, control_divisor=5),
+    )
+    run = simulate(scenario)
+    assert run.outcome == Outcome.REACHED
+    assert run.certified
 
 
 def test_timed_out(swing_up):
@@ -113,7 +125,7 @@ def test_infeasible_start_and_goal_name_pairs_depths_joints_and_limits(panda):
 
 
 def test_inside_the_margin_is_infeasible(swing_up):
-    control = replace(swing_up.control, margin=0.6)
+    control = replace(swing_up.control, margin=1.3)
     run = simulate(replace(swing_up, control=control))
     assert run.outcome == Outcome.INFEASIBLE
     assert "mm apart" in run.detail
@@ -126,16 +138,21 @@ def test_an_arm_too_weak_is_infeasible(swing_up):
     assert "torque limits" in run.detail
 
 
-def test_contact_ends_the_record_with_a_verdict(swing_up):
-    """With torque cut to a tenth behind the controller's back the arm swings into an obstacle."""
-    limp = replace(swing_up.gains, position=1e-3, velocity=1e-3)
-    blocked = replace(
-        swing_up, gains=limp, start=(1.3, 0.0), goal=(1.3, 0.2),
-        timing=replace(swing_up.timing, torque_share=1.0),
-        control=replace(swing_up.control, form="regulation"),
+def test_contact_ends_the_record_with_a_verdict(swing_up, monkeypatch):
+    """A controller that sees no obstacle is stopped at the first sample in contact."""
+    blind = plan_motion(
+        replace(swing_up, scene=Scene()),
+        densarm.Clearance(swing_up.arm, Scene()),
+        GuideKind.PATH,
     )
-    run = simulate(blocked, guide="direct")
-    assert run.outcome in set(Outcome) - {Outcome.COLLIDED} or run.clearance[-1] <= 0.0
+    monkeypatch.setattr("densarm.closed_loop.plan_motion", lambda *_: blind)
+    run = simulate(swing_up)
+    assert run.outcome == Outcome.COLLIDED
+    assert run.detail.startswith("lower_link_0 and right at t = ")
+    assert (run.clearance[:-1] > 0.0).all()
+    assert run.clearance[-1] <= 0.0
+    assert not run.certified
+    np.testing.assert_array_equal(run.tau[-1], run.tau[-2])
 
 
 def test_scenario_of_a_run_tells_guide_and_seed(swing_up):

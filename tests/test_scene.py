@@ -57,7 +57,9 @@ def test_pose(obstacle):
 
 def test_shapes():
     assert Sphere(name="a", radius=0.3).geometry().radius == 0.3
-    np.testing.assert_allclose(Box(name="a", size=(1, 2, 3)).geometry().halfSide, [0.5, 1, 1.5])
+    corners = Box(name="a", size=(1, 2, 3)).geometry().points()
+    assert {tuple(np.abs(corner)) for corner in corners} == {(0.5, 1.0, 1.5)}
+    assert len(corners) == 8
     capsule = Capsule(name="a", radius=0.1, length=0.4).geometry()
     assert (capsule.radius, capsule.halfLength) == (0.1, 0.2)
     assert isinstance(Cylinder(name="a", radius=0.1, length=0.4).geometry(), coal.ConvexBase)

@@ -8,8 +8,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
+from densarm.clearance import COAL_TOLERANCE, DISTANCE_TOLERANCE
 from densarm.errors import RobotDescriptionError
 from densarm.shapes import (
+    box_hull,
     circumscribed_cylinder,
     convex_hull,
     differentiable_geometry,
@@ -115,6 +117,7 @@ def test_cylinder_between_two_spheres_becomes_a_capsule(model, mismatch):
     box, capsule, ball = differentiable_geometry(model, geometry).geometryObjects
     assert [box.name, capsule.name, ball.name] == ["arm_1", "arm_2", "arm_4"]
     assert isinstance(capsule.geometry, coal.Capsule)
+    assert box.geometry.num_points == 8
     assert capsule.placement.isApprox(turned)
     assert capsule.geometry.halfLength == 0.25
     np.testing.assert_allclose(capsule.geometry.radius, 0.1 + mismatch, rtol=1e-9)
@@ -154,7 +157,7 @@ def test_points_without_a_hull_are_refused(points, message):
     [
         coal.Sphere(0.2),
         coal.Capsule(0.1, 0.6),
-        coal.Box(0.2, 0.4, 0.6),
+        box_hull((0.2, 0.4, 0.6)),
         convex_hull(np.eye(4)[:, :3]),
     ],
 )
@@ -169,3 +172,36 @@ def test_extreme_points_enclose_the_shape(shape):
         identity = coal.Transform3s()
         d = coal.distance(shape, identity, plane, identity, coal.DistanceRequest(True), result)
         assert far - d == pytest.approx((points @ direction).max() + radius, abs=1e-9)
+
+
+def test_distances_between_boxes_that_nearly_touch():
+    """coal's boxes err here by 1e-6 m and more; the largest gap over all axes is exact."""
+    random = np.random.default_rng(0)
+    for _ in range(300):
+        a, b = random.uniform(0.02, 1.0, (2, 3))
+        turn = pin.exp3(random.normal(size=3) * 10.0 ** random.uniform(-9, 0))
+        axes = separating_axes(turn)
+        reach = np.abs(axes) @ (a / 2) + np.abs(axes @ turn) @ (b / 2)
+        direction = random.normal(size=3)
+        gap = random.choice([-1, 1]) * 10.0 ** random.uniform(-9, -3)
+        centre = direction * ((reach + gap) / np.abs(axes @ direction)).min()
+        expected = (np.abs(axes @ centre) - reach).max()
+        request = coal.DistanceRequest(True)
+        request.gjk_tolerance = request.epa_tolerance = COAL_TOLERANCE
+        d = coal.distance(
+            box_hull(a),
+            coal.Transform3s(),
+            box_hull(b),
+            coal.Transform3s(turn, centre),
+            request,
+            coal.DistanceResult(),
+        )
+        # Where edges and corners are nearest, the axes give less than the distance apart.
+        assert d > expected - DISTANCE_TOLERANCE
+        assert expected > 0 or d < expected + DISTANCE_TOLERANCE
+
+
+def separating_axes(turn: np.ndarray) -> np.ndarray:
+    crossed = np.cross(np.eye(3)[:, None], turn.T[None]).reshape(9, 3)
+    length = np.linalg.norm(crossed, axis=1)
+    return np.vstack([np.eye(3), turn.T, crossed[length > 1e-14] / length[length > 1e-14, None]])

@@ -68,16 +68,22 @@ def time_step(arm: str, shapes: str = "hull", pairs: int = 64, rounds: int = 3) 
     step, bare = _controller(clearance, reference).torque, _bare_calls(clearance)
     states = _states(loaded, reference)
     blocks = [states[k : k + _BLOCK] for k in range(0, len(states), _BLOCK)]
-    times = np.array([(_mean(step, b), _mean(bare, b)) for b in blocks[:1] + rounds * blocks])
-    step_us, bare_us = (np.median(times[1:], axis=0) * 1e6).tolist()
+    times: tuple[list[float], list[float]] = ([], [])
+    for block in blocks[:1] + rounds * blocks:
+        for calls, record in zip((step, bare), times, strict=True):
+            record.extend(_seconds(calls, block))
+    step_us, bare_us = (float(np.median(record[_BLOCK:])) * 1e6 for record in times)
     return StepTiming(step_us, bare_us, step_us / bare_us, clearance.n_pairs)
 
 
-def _mean(step: Step, states: list[tuple[float, Array, Array]]) -> float:
-    began = time.perf_counter()
-    for t, q, v in states:
-        step(t, q, v)
-    return (time.perf_counter() - began) / len(states)
+def _seconds(step: Step, states: list[tuple[float, Array, Array]]) -> list[float]:
+    """Time every call by itself, so that what interrupts some of them leaves the median alone."""
+    seconds = []
+    for state in states:
+        began = time.perf_counter()
+        step(*state)
+        seconds.append(time.perf_counter() - began)
+    return seconds
 
 
 def _controller(clearance: Clearance, reference: Reference) -> DensityTracking:

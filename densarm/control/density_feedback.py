@@ -38,7 +38,7 @@ class DensityFeedback:
         self._field = field
         self._gain = gains.velocity
         self._period = period
-        self._dynamics = InverseDynamics(arm)
+        self._dynamics = InverseDynamics(arm, arm.limits.acceleration)
         self._metric = 1.0 / arm.mass_matrix(field.guided.chain.q[-1]).diagonal().max()
 
     def torque(self, t: float, q: ArrayLike, v: ArrayLike) -> Array:

@@ -34,7 +34,7 @@ class DensityRegulation:
         self._field = field
         self._gain = gains.velocity
         self._period = period
-        self._dynamics = InverseDynamics(arm)
+        self._dynamics = InverseDynamics(arm, arm.limits.acceleration)
 
     def torque(self, t: float, q: ArrayLike, v: ArrayLike) -> Array:
         """Act as `Controller.torque`."""

@@ -44,7 +44,8 @@ class DensityTracking:
         self._density = density
         self._reference = reference
         self._gains = gains
-        self._dynamics = InverseDynamics(arm)
+        # The reference keeps the acceleration limits; feedback on top of it may need more.
+        self._dynamics = InverseDynamics(arm, np.full(arm.nv, np.inf))
         self._gauge = density.parameters.gauge
         self._brake, self._attract = np.zeros(arm.nv), np.zeros(arm.nv)
 

@@ -17,17 +17,19 @@ class InverseDynamics:
     there is none, β = 0 and γ is the largest that holds them, which leaves a brake straight.
 
     Args:
-        arm: its dynamics and limits.
+        arm: its dynamics and torque limits.
+        acceleration_limit: on the sum of both parts (nv,) [rad/s² or m/s²]; may be infinite.
 
     Source: [ZNV] eq. 16-17; saturation [ZNV] eq. 13-14, applied to the attraction alone.
     """
 
-    def __init__(self, arm: Arm) -> None:
+    def __init__(self, arm: Arm, acceleration_limit: Array) -> None:
         self._model = arm.model
         self._data = arm.model.createData()
         self._mass = self._data.M
         self._nonlinear = self._data.nle
-        self._limits = arm.limits
+        self._acceleration_limit = acceleration_limit
+        self._effort_limit = arm.limits.effort
 
     def update(self, q: Array, v: Array) -> None:
         """Compute M and H at the state, q (nq,) and v (nv,)."""
@@ -46,8 +48,8 @@ class InverseDynamics:
             self._nonlinear,
             brake,
             attract,
-            self._limits.acceleration,
-            self._limits.effort,
+            self._acceleration_limit,
+            self._effort_limit,
         )
 
 

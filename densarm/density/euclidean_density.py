@@ -63,6 +63,10 @@ class EuclideanDensity:
         distance = np.maximum(np.sum((x - self.goal) ** 2, axis=-1), V_MIN)
         return self.log_psi(x) - self.parameters.alpha * np.log(distance)
 
+    def height(self, x: Array) -> Array:
+        """Return ln ρ, which `direction` climbs, as `log_value` has it."""
+        return self.log_value(x)
+
     def gradient(self, x: Array, gauge: Gauge) -> Array:
         """Return the gradient in a gauge at points `x` (..., n), as `DensitySample.gradient`."""
         rows = _rows(x)

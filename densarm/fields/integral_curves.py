@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from densarm.arrays import Array
+from densarm.density.implicit_function import smallest_value
 from densarm.fields.navigation_field import NavigationField
 from densarm.outcome import Outcome
 from densarm.validation import positive, positive_integer
@@ -28,8 +29,8 @@ class CurveParameters:
     """A step's length per estimated distance h/‖∇h‖ to the nearest obstacle."""
     longest_step: float = 0.25
     """Longest step [m]."""
-    shortest_step: float = 1e-8
-    """A curve that must step shorter than this has met a critical point [m]."""
+    shortest_step: float = 1e-6
+    """A curve that can only climb in shorter steps than this has met a critical point [m]."""
     longest_curve: float = 1e3
     """Length at which a curve is given up [m]."""
     most_steps: int = 20_000
@@ -84,14 +85,14 @@ def integral_curves(
 
     The curves are those of ẋ = k(x), whose speed spans many decades. Along
     the rim of a sensing region the field is stiff, so the integrator is Shampine and Reichelt's
-    Rosenbrock method of order 2, with a step of its own for each start: it is
-    rejected and shortened where its error estimate exceeds the tolerance or the direction turns
-    by more than half a unit; it is no longer than half the distance to the goal, or the given
-    share of h/‖∇h‖, an obstacle's distance to first order, plus the tolerance. Only accepted points count: a field that leads into an obstacle
-    does enter it.
+    Rosenbrock method of order 2, with a step of its own for each start. A step
+    is rejected and shortened where its error estimate exceeds the tolerance or where it does not
+    climb, as it cannot from a maximum; it is no longer than half the distance to the goal, or
+    the given share of h/‖∇h‖, an obstacle's distance to first order, plus the tolerance. A step
+    into an obstacle counts if it is accurate: a field that leads there does enter.
 
     A curve has *reached* within the reach radius; has *collided* at h ≤ 0; is *stuck* where k
-    vanishes or turns within the shortest step; is *infeasible* if it starts in an obstacle.
+    vanishes or no longer climbs; is *infeasible* if it starts in an obstacle.
 
     Args:
         field: the field and its obstacles.
@@ -138,6 +139,7 @@ class _Front:
         self.length = np.zeros(count)
         self.step = np.full(count, p.longest_step)
         self.slope = _unit(self.field.direction(self.x))
+        self.height = self.field.height(self.x)
         self.outcome = np.full(count, Outcome.TIMED_OUT, dtype="U10")
         self.outcome[self.smallest_h <= 0.0] = Outcome.INFEASIBLE
         self.active = np.flatnonzero(self.smallest_h > 0.0)
@@ -149,14 +151,16 @@ class _Front:
         x, f0 = self.x[i], self.slope[i]
         step = np.minimum(self.step[i], self.longest[i])
         ahead, f2, error = self._rosenbrock(x, f0, step)
-        # Across a critical point the direction reverses, however short the step.
-        turn = np.linalg.norm(f2 - f0, axis=-1)
-        accepted = (error <= p.tolerance) & (turn <= _LARGEST_TURN)
+        height = self.field.height(ahead)
+        entered = smallest_value(self.field.obstacles, ahead) <= 0.0
+        climbed = (height > self.height[i]) | entered
+        accepted = (error <= p.tolerance) & climbed
         factor = 0.9 * np.cbrt(p.tolerance / np.maximum(error, 1e-300))
-        factor = np.where(turn > _LARGEST_TURN, 0.5 * np.minimum(factor, 1.0), factor)
-        self.step[i] = np.minimum(step * np.clip(factor, 0.2, 5.0), p.longest_step)
+        factor = np.where(climbed, np.clip(factor, 0.2, 5.0), np.clip(factor, 0.2, 0.5))
+        self.step[i] = np.minimum(step * factor, p.longest_step)
         moved = i[accepted]
         self.x[moved], self.slope[moved] = ahead[accepted], f2[accepted]
+        self.height[moved] = height[accepted]
         self.length[moved] += np.linalg.norm(ahead - x, axis=-1)[accepted]
         self._look_around(moved)
         self._retire()
@@ -215,8 +219,7 @@ class _Front:
         return _unit(self.field.direction(x))
 
 
-_LARGEST_TURN = 0.5  # change of the unit direction in a step
-_DIFFERENCE = 1e-6  # of points for the Jacobian [m]
+_DIFFERENCE = 1e-8  # of points for the Jacobian [m]
 _DAMPING = 1.0 / (2.0 + np.sqrt(2.0))  # makes the method L-stable
 _ERROR_WEIGHT = 6.0 + np.sqrt(2.0)
 

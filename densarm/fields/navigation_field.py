@@ -23,3 +23,7 @@ class NavigationField(Protocol):
     def direction(self, x: Array) -> Array:
         """Return k at points `x` (..., n) [m], of shape (..., n); zero at critical points."""
         ...
+
+    def height(self, x: Array) -> Array:
+        """Return a function that k climbs at points `x` (..., n), of shape (...)."""
+        ...

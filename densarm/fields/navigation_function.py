@@ -7,6 +7,7 @@ from numpy.typing import ArrayLike
 
 from densarm.arrays import Array
 from densarm.density.implicit_function import ImplicitFunction
+from densarm.density.navigation_density import V_MIN
 from densarm.validation import finite_vector, positive
 
 
@@ -43,11 +44,18 @@ class NavigationFunction:
         self.kappa = positive("kappa", kappa)
 
     def value(self, x: Array) -> Array:
-        """Return ψ at points `x` (..., n), of shape (...), in [0, 1]; 1 in contact."""
-        free = np.all([h(x) > 0.0 for h in self.obstacles], axis=0)
-        log_beta = sum(np.log(np.where(free, h(x), 1.0)) for h in self.obstacles)
+        """Return ψ = 1/(1 + exp height) at points `x` (..., n), of shape (...); 1 in contact."""
+        return np.exp(-np.logaddexp(0.0, self.height(x)))
+
+    def height(self, x: Array) -> Array:
+        """Return ln(β)/κ − ln γ at points `x` (..., n), of shape (...); −inf in contact."""
         gamma = np.sum((x - self.goal) ** 2, axis=-1)
-        return np.where(free, gamma / (gamma + np.exp(log_beta / self.kappa)), 1.0)
+        total = -np.log(np.maximum(gamma, V_MIN))
+        for obstacle in self.obstacles:
+            h = obstacle(x)
+            log_h = np.log(np.where(h > 0.0, h, 1.0))
+            total += np.where(h > 0.0, log_h / self.kappa, -np.inf)
+        return total  # type: ignore[no-any-return]
 
     def direction(self, x: Array) -> Array:
         """Return −∇ψ/(ψ(1 − ψ)) · γ at points `x` (..., n), zero at the goal; out of contact."""

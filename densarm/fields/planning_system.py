@@ -25,9 +25,9 @@ class PlannedCurve:
 class PlanningSystem:
     """Integrates the direction of q̇ = ∇ρ(q) as a curve without time.
 
-    Every step goes up the density: it is halved until ρ has grown, and no step is longer than
-    a share of the clearance ahead, so that none jumps through an obstacle. A curve that can no
-    longer climb has met a critical point of ρ.
+    Every step goes up the density: it is halved until ρ has grown. No step is longer than twice
+    the last one, or than a share of the clearance ahead, so that none jumps through an obstacle.
+    A curve that can no longer climb has met a critical point of ρ.
 
     Args:
         guided: the density and its sub-goals.
@@ -56,27 +56,28 @@ class PlanningSystem:
         guided = self._guided
         guided.restart()
         goal, points = guided.chain.q[-1], [start]
-        q = start
+        q, length = start, self.STEP
         for _ in range(self.MAX_STEPS):
             guided.update(q)
             error = guided.goal_distance.error(q)
             if guided.chain.is_last and np.abs(error).max() <= self.SMALLEST_STEP:
                 return PlannedCurve(np.array([*points[:-1], goal]), reached=True, detail="")
-            q_next = self._climb(q, float(np.linalg.norm(error)))
+            q_next = self._climb(q, min(self.STEP, 2.0 * length, float(np.linalg.norm(error))))
             if q_next is None:
                 break
+            length = float(np.linalg.norm(self._arm.difference(q, q_next)))
             q = q_next
             points.append(q)
         return PlannedCurve(np.array(points), reached=False, detail=guided.describe_stall(q))
 
-    def _climb(self, q: Array, distance_left: float) -> Array | None:
-        """Return the next point, or None where ρ has no slope."""
+    def _climb(self, q: Array, longest: float) -> Array | None:
+        """Return the next point, at most so far [rad], or None where ρ has no slope."""
         if self._guided.is_critical():
             return None
         self._density.write_gradient(Gauge.LOG, self._gradient)
         direction = self._gradient / np.linalg.norm(self._gradient)
         before = self._log_density()
-        length = min(self.STEP, distance_left, self._clear_length(direction))
+        length = min(longest, self._clear_length(direction))
         while length > self.SMALLEST_STEP:
             candidate = self._arm.integrate(q, length * direction)
             self._density.update(candidate)

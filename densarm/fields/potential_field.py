@@ -45,11 +45,11 @@ class PotentialField:
         self.attraction = positive("attraction", attraction)
         self.repulsion = positive("repulsion", repulsion)
 
-    def value(self, x: Array) -> Array:
-        """Return U at points `x` (..., n), of shape (...); huge in contact."""
-        total = 0.5 * self.attraction * np.sum((x - self.goal) ** 2, axis=-1)
+    def height(self, x: Array) -> Array:
+        """Return −U at points `x` (..., n), of shape (...); hugely negative in contact."""
+        total = -0.5 * self.attraction * np.sum((x - self.goal) ** 2, axis=-1)
         for h in self.obstacles:
-            total += 0.5 * self.repulsion * self._excess(h(x)) ** 2
+            total -= 0.5 * self.repulsion * self._excess(h(x)) ** 2
         return total  # type: ignore[no-any-return]
 
     def direction(self, x: Array) -> Array:

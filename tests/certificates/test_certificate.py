@@ -129,9 +129,7 @@ def test_obstacle_between_two_samples(swing_up_run):
 
 def test_obstacle_on_the_way(swing_up_run):
     run, arm = swing_up_run, swing_up_run.scenario.arm
-    angles = arm.angles(run.q[len(run.q) // 2])
-    tip = np.array([np.sin(angles).sum(), 0.0, 0.0])
-    absolute = np.cumsum(angles)
+    absolute = np.cumsum(arm.angles(run.q[len(run.q) // 2]))
     tip = (np.sin(absolute).sum(), 0.0, -np.cos(absolute).sum())
     blocked = Scene([*run.scenario.scene, Sphere(name="late", radius=0.01, position=tip)])
     scenario = replace(run.scenario, scene=blocked)

@@ -10,11 +10,11 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from densarm.clearance import Clearance
+from densarm.closed_loop import make_controller
 from densarm.control.gains import Gains
 from densarm.errors import InvalidValueError
 from densarm.motion_plan import plan_motion
 from densarm.scenario import ControlForm, GuideKind, load_scenario
-from densarm.closed_loop import make_controller
 
 
 @pytest.fixture(scope="module", params=ControlForm)

@@ -22,7 +22,7 @@ def arm(request):
 
 @pytest.fixture(scope="module")
 def dynamics(arm):
-    return InverseDynamics(arm)
+    return InverseDynamics(arm, arm.limits.acceleration)
 
 
 @st.composite

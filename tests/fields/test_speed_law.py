@@ -88,5 +88,5 @@ def test_no_speed_without_room_and_no_bound_without_pairs(bound, law):
 
 @pytest.mark.parametrize("share", [0.0, -0.1, 1.1, np.nan])
 def test_share_is_checked(share):
-    with pytest.raises(InvalidValueError, match="^braking_share = "):
+    with pytest.raises(InvalidValueError, match=r"^braking_share = "):
         SpeedParameters(braking_share=share)

@@ -90,7 +90,7 @@ def test_a_path_that_is_not_clear_is_refused(bound_and_chain):
     bound, _ = bound_and_chain
     # The stretched arm sweeps over the right obstacle.
     through = np.stack([bound.arm.configuration(angles) for angles in ([0.4, 0.0], [2.0, 0.0])])
-    with pytest.raises(InvalidValueError, match="^path = "):
+    with pytest.raises(InvalidValueError, match=r"^path = "):
         SubGoalChain(bound, GuidePath(through, is_clear=True), SensingParameters())
 
 

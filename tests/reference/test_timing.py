@@ -52,7 +52,11 @@ def test_limits_hold_at_every_sample(timed):
     for k in range(len(reference.position)):
         theta, v, a = reference.sample((k + 0.5) * PERIOD)
         tau = pin.rnea(arm.model, arm.data, arm.configuration(theta), v, a)
-        ratios = np.abs(v) / limits.velocity, np.abs(a) / limits.acceleration, abs(tau) / limits.effort
+        ratios = (
+            np.abs(v) / limits.velocity,
+            np.abs(a) / limits.acceleration,
+            abs(tau) / limits.effort,
+        )
         peak = np.maximum(peak, [ratio.max() for ratio in ratios])
     allowed = [shares.velocity_share, shares.acceleration_share, shares.torque_share]
     assert (peak <= EXCESS * np.array(allowed)).all()

@@ -68,7 +68,9 @@ def test_ends_when_the_goal_is_reached_and_held(arm):
 
 def test_passing_through_the_goal_is_not_reaching_it(arm):
     p = SimulationParameters(time_limit=2.0)
-    run = FixedStepLoop(arm, p).run(Limp(), arm.configuration([0.5, 0.0]), arm.configuration([0, 0]))
+    run = FixedStepLoop(arm, p).run(
+        Limp(), arm.configuration([0.5, 0.0]), arm.configuration([0, 0])
+    )
     assert run.end == LoopEnd.TIMED_OUT
 
 

@@ -1,6 +1,7 @@
 """The plant: conservation of energy, orders of the integrators, an independent engine."""
 
 import xml.etree.ElementTree as ElementTree
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -62,11 +63,8 @@ def test_order_by_step_halving(request, name, integrator, order):
         return last
 
     ends = [end(coarsest / 2**halving) for halving in range(4)]
-    steps = [
-        np.concatenate([arm.difference(a[0], b[0]), a[1] - b[1]])
-        for a, b in zip(ends[:-1], ends[1:], strict=True)
-    ]
-    ratios = [np.linalg.norm(a) / np.linalg.norm(b) for a, b in zip(steps, steps[1:], strict=False)]
+    steps = [np.concatenate([arm.difference(a[0], b[0]), a[1] - b[1]]) for a, b in pairwise(ends)]
+    ratios = [np.linalg.norm(a) / np.linalg.norm(b) for a, b in pairwise(steps)]
     assert np.log2(ratios) == pytest.approx(order, abs=0.25)
 
 
