@@ -13,8 +13,8 @@ if TYPE_CHECKING:
     from densarm.closed_loop import make_controller, simulate
     from densarm.control.controller import Controller
     from densarm.control.density_feedback import DensityFeedback
-    from densarm.control.density_regulation import DensityRegulation
     from densarm.control.density_tracking import DensityTracking
+    from densarm.control.field_regulation import FieldRegulation
     from densarm.control.gains import Gains
     from densarm.density.gauge import Gauge
     from densarm.density.goal_distance import EuclideanDistance, ProductDistance, TorusDistance
@@ -74,11 +74,11 @@ __all__ = [
     "DensarmError",
     "DensityFeedback",
     "DensityParameters",
-    "DensityRegulation",
     "DensitySample",
     "DensityTracking",
     "DirectGuide",
     "EuclideanDistance",
+    "FieldRegulation",
     "FileContentError",
     "Gains",
     "Gauge",
@@ -129,8 +129,8 @@ _NAMES = {
     "clearance": ("Clearance", "ClearanceSample"),
     "control.controller": ("Controller",),
     "control.density_feedback": ("DensityFeedback",),
-    "control.density_regulation": ("DensityRegulation",),
     "control.density_tracking": ("DensityTracking",),
+    "control.field_regulation": ("FieldRegulation",),
     "control.gains": ("Gains",),
     "density.gauge": ("Gauge",),
     "density.goal_distance": ("EuclideanDistance", "ProductDistance", "TorusDistance"),

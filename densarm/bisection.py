@@ -1,8 +1,9 @@
 """Bisection: proof along a motion from distances at a few of its configurations."""
 
-from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
+from heapq import heappop, heappush
+from itertools import count
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,7 +37,8 @@ def bisect(
     """Prove pairs apart along a motion x(t), t between two ends.
 
     A pair is apart on all of [a, b] if slack(a) + slack(b) > motion(a, b). Other pairs are tried
-    again on both halves, all longer arcs before shorter ones: most contacts are found early.
+    again on both halves. Arcs whose ends are nearest to contact come first, so that a motion that
+    cannot be proved is given up early.
 
     Args:
         slack: t and pairs to their distances beyond what must be kept (len(pairs),) [m].
@@ -51,9 +53,10 @@ def bisect(
     for t, values in zip(ends, (slack_first, slack_last), strict=True):
         if (values <= 0.0).any():
             return _failure(evaluated, every[values <= 0.0], t, in_contact=True)
-    pending = deque([(*ends, slack_first, slack_last, every)])
+    newest_first = count(0, -1)
+    pending = [(0.0, next(newest_first), *ends, slack_first, slack_last, every)]
     while pending:
-        a, b, slack_a, slack_b, pairs = pending.popleft()
+        _, _, a, b, slack_a, slack_b, pairs = heappop(pending)
         near = ~(slack_a + slack_b > motion(a, b, pairs))
         if not near.any():
             continue
@@ -65,8 +68,9 @@ def bisect(
         slack_middle = slack(middle, pairs)
         if (slack_middle <= 0.0).any():
             return _failure(evaluated, pairs[slack_middle <= 0.0], middle, in_contact=True)
-        pending.append((a, middle, slack_a, slack_middle, pairs))
-        pending.append((middle, b, slack_middle, slack_b, pairs))
+        for half in ((a, middle, slack_a, slack_middle), (middle, b, slack_middle, slack_b)):
+            nearness = float((half[2] + half[3]).min())
+            heappush(pending, (nearness, next(newest_first), *half, pairs))
     return Bisection(np.unique(evaluated), every[:0], np.nan, in_contact=False)
 
 

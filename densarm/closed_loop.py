@@ -2,7 +2,7 @@
 
 import time
 from collections.abc import Callable, Iterator
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,8 +11,8 @@ from densarm.arrays import Array
 from densarm.clearance import Clearance
 from densarm.control.controller import Controller
 from densarm.control.density_feedback import DensityFeedback
-from densarm.control.density_regulation import DensityRegulation
 from densarm.control.density_tracking import DensityTracking
+from densarm.control.field_regulation import FieldRegulation
 from densarm.fields.density_field import DensityField
 from densarm.fields.speed_law import SpeedLaw
 from densarm.guides.guide import Guide, NoPath
@@ -28,6 +28,21 @@ from densarm.validation import one_of
 
 OnProgress = Callable[[str], None]
 """Told in a phrase what is being done."""
+
+
+@dataclass(frozen=True)
+class Drive:
+    """What drives an arm to its goal."""
+
+    controller: Controller
+    describe_stall: Callable[[Array], str]
+    """From a configuration (nq,) to why the arm rests there, as a phrase."""
+    reference: Reference | None = None
+    """What the controller tracks, if it does."""
+
+
+Method = Callable[[Scenario, Clearance], Drive | NoPath]
+"""A way to drive an arm: from a scenario, and the clearance of its arm and scene."""
 
 
 def simulate(
@@ -56,20 +71,45 @@ def simulate(
         scenario = replace(scenario, control=replace(scenario.control, guide=guide))
     if seed is not None:
         scenario = replace(scenario, seed=seed)
-    guide = scenario.control.guide if guide is None else guide
+    chosen = scenario.control.guide if guide is None else guide
+
+    def by_density(scenario: Scenario, clearance: Clearance) -> Drive | NoPath:
+        plan = plan_motion(scenario, clearance, chosen)
+        if isinstance(plan, NoPath):
+            return plan
+        controller = make_controller(scenario, plan)
+        return Drive(controller, plan.guided.describe_stall, plan.reference)
+
+    run = run_closed_loop(scenario, by_density, on_progress)
+    return replace(run, plan_time=0.0) if chosen == GuideKind.DIRECT else run
+
+
+def run_closed_loop(
+    scenario: Scenario, method: Method, on_progress: OnProgress = lambda _: None
+) -> Trajectory:
+    """Run a scenario's torque-driven closed loop by any method.
+
+    Args:
+        scenario: what to run.
+        method: called once, unless start or goal is infeasible.
+        on_progress: told what is being done.
+
+    Returns:
+        The recorded run; as its `plan_time` the time that the method took.
+    """
     clearance = Clearance(scenario.arm, scenario.scene)
     if fault := _fault(scenario, clearance):
         return _at_rest(scenario, clearance, Outcome.INFEASIBLE, fault)
     on_progress("planning")
     began = time.perf_counter()
     try:
-        plan = plan_motion(scenario, clearance, guide)
+        drive = method(scenario, clearance)
     except InfeasibleTimingError as error:
         return _at_rest(scenario, clearance, Outcome.INFEASIBLE, str(error))
-    plan_time = 0.0 if guide == GuideKind.DIRECT else time.perf_counter() - began
-    if isinstance(plan, NoPath):
-        return _at_rest(scenario, clearance, Outcome.NO_PATH, plan.reason, plan_time)
-    return _run(scenario, clearance, plan, plan_time, on_progress)
+    plan_time = time.perf_counter() - began
+    if isinstance(drive, NoPath):
+        return _at_rest(scenario, clearance, Outcome.NO_PATH, drive.reason, plan_time)
+    return _run(scenario, clearance, drive, plan_time, on_progress)
 
 
 def make_controller(scenario: Scenario, plan: MotionPlan) -> Controller:
@@ -87,27 +127,27 @@ def make_controller(scenario: Scenario, plan: MotionPlan) -> Controller:
         return DensityTracking(arm, density, plan.reference, scenario.gains)
     field = DensityField(plan.guided, SpeedLaw(plan.bound, scenario.speed), scenario.gains.rate)
     if scenario.control.form == ControlForm.REGULATION:
-        return DensityRegulation(arm, field, scenario.gains, period)
+        return FieldRegulation(arm, field, scenario.gains, period)
     return DensityFeedback(arm, field, scenario.gains, period)
 
 
 def _run(
     scenario: Scenario,
     clearance: Clearance,
-    plan: MotionPlan,
+    drive: Drive,
     plan_time: float,
     on_progress: OnProgress,
 ) -> Trajectory:
     recording = FixedStepLoop(scenario.arm, scenario.simulation).run(
-        make_controller(scenario, plan),
-        scenario.start_configuration,
-        scenario.goal_configuration,
-        not_before=0.0 if plan.reference is None else plan.reference.duration,
+        drive.controller,
+        scenario.start,
+        scenario.goal,
+        not_before=0.0 if drive.reference is None else drive.reference.duration,
         on_progress=lambda at: on_progress(f"running, {at:.1f} s simulated"),
     )
     on_progress("computing clearance")
     smallest, pair = _smallest_distances(clearance, recording.q)
-    outcome, detail = _outcome(recording, plan)
+    outcome, detail = _outcome(recording, drive)
     last = len(smallest)
     if (smallest <= 0.0).any():
         last = int(np.argmax(smallest <= 0.0)) + 1
@@ -124,16 +164,16 @@ def _run(
         outcome=outcome,
         detail=detail,
         plan_time=plan_time,
-        tracking_error=_tracking_error(scenario, plan.reference, recording),
+        tracking_error=_tracking_error(scenario, drive.reference, recording),
     )
 
 
-def _outcome(recording: Recording, plan: MotionPlan) -> tuple[Outcome, str]:
+def _outcome(recording: Recording, drive: Drive) -> tuple[Outcome, str]:
     if recording.end == LoopEnd.REACHED:
         return Outcome.REACHED, ""
     if recording.end == LoopEnd.TIMED_OUT:
         return Outcome.TIMED_OUT, f"after {recording.time[-1]:.3g} s"
-    return Outcome.STUCK, plan.guided.describe_stall(recording.q[-1])
+    return Outcome.STUCK, drive.describe_stall(recording.q[-1])
 
 
 def _smallest_distances(clearance: Clearance, q: Array) -> tuple[Array, NDArray[np.int64]]:
@@ -163,23 +203,21 @@ def _fault(scenario: Scenario, clearance: Clearance) -> str:
     ends = {"start": scenario.start, "goal": scenario.goal}
     return "; ".join(
         f"{name}: {fault}"
-        for name, angles in ends.items()
-        for fault in [
-            *_limit_faults(scenario, np.array(angles)),
-            *_contact_faults(scenario, clearance, np.array(angles)),
-        ]
+        for name, q in ends.items()
+        for fault in [*_limit_faults(scenario, q), *_contact_faults(scenario, clearance, q)]
     )
 
 
-def _limit_faults(scenario: Scenario, angles: Array) -> Iterator[str]:
+def _limit_faults(scenario: Scenario, q: Array) -> Iterator[str]:
     limits, names = scenario.arm.limits, scenario.arm.joint_names
+    angles = scenario.arm.angles(q)
     for j in np.flatnonzero((angles < limits.lower) | (angles > limits.upper)):
         allowed = f"[{limits.lower[j]:.4g}, {limits.upper[j]:.4g}]"
         yield f"joint {names[j]!r} at {angles[j]:.4g} is outside {allowed}"
 
 
-def _contact_faults(scenario: Scenario, clearance: Clearance, angles: Array) -> Iterator[str]:
-    distance = clearance.distances(scenario.arm.configuration(angles))
+def _contact_faults(scenario: Scenario, clearance: Clearance, q: Array) -> Iterator[str]:
+    distance = clearance.distances(q)
     for k in np.argsort(distance)[: int((distance <= scenario.control.margin).sum())]:
         pair, gap = " and ".join(clearance.pairs[k]), distance[k] * 1e3
         yield f"{pair} overlap by {-gap:.3g} mm" if gap <= 0.0 else f"{pair} are {gap:.3g} mm apart"
@@ -188,7 +226,7 @@ def _contact_faults(scenario: Scenario, clearance: Clearance, angles: Array) -> 
 def _at_rest(
     scenario: Scenario, clearance: Clearance, outcome: Outcome, detail: str, plan_time: float = 0.0
 ) -> Trajectory:
-    q, rest = scenario.start_configuration, np.zeros((1, scenario.arm.nv))
+    q, rest = scenario.start, np.zeros((1, scenario.arm.nv))
     return Trajectory(
         scenario=scenario,
         time=np.zeros(1),

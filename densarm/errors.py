@@ -3,6 +3,8 @@
 from collections.abc import Iterable
 from difflib import get_close_matches
 
+import numpy as np
+
 
 class DensarmError(ValueError):
     """Base of every error that densarm raises about its input; its message is one line."""
@@ -56,5 +58,6 @@ class FileContentError(DensarmError):
 
 
 def _short(value: object) -> str:
-    text = " ".join(repr(value).split())
+    plain = value.item() if isinstance(value, np.generic) else value
+    text = " ".join(repr(plain).split())
     return text if len(text) <= 80 else text[:77] + "..."

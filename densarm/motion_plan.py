@@ -50,7 +50,7 @@ def plan_motion(
         InfeasibleTimingError: the limits allow no motion along the path.
     """
     arm, control = scenario.arm, scenario.control
-    start, goal = scenario.start_configuration, scenario.goal_configuration
+    start, goal = scenario.start, scenario.goal
     bound = SweptBound(clearance, control.margin)
     depart, arrive = (_inside_limits(bound, q) for q in (start, goal))
     ends = min(bound.slack(q).min(initial=np.inf) for q in (start, depart, arrive))
@@ -94,7 +94,7 @@ def _weights(scenario: Scenario) -> Array | None:
     """Return weights of V: in proportion to inertia where the density is a torque, else none."""
     if scenario.control.form != ControlForm.PLAIN:
         return None
-    inertia = scenario.arm.mass_matrix(scenario.goal_configuration).diagonal()
+    inertia = scenario.arm.mass_matrix(scenario.goal).diagonal()
     return np.asarray(inertia / inertia.max())
 
 

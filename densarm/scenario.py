@@ -29,7 +29,7 @@ from densarm.robot_description import RobotDescription
 from densarm.scene import Scene
 from densarm.simulation.fixed_step_loop import SimulationParameters
 from densarm.tables import parse_table
-from densarm.validation import finite_tuple, non_negative, non_negative_integer, one_of
+from densarm.validation import finite_vector, non_negative, non_negative_integer, one_of
 
 
 class GuideKind(StrEnum):
@@ -80,23 +80,23 @@ class ControlParameters:
             raise InvalidValueError("kappa", self.kappa, f"a number >= {KAPPA_MIN}, or infinity")
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Scenario:
     """Everything that determines a run.
 
     Raises:
-        InvalidValueError: start or goal is not one finite number per joint, the seed is not a
-            whole number, or the density gives no feedback that settles at a goal.
+        InvalidValueError: start or goal is not a configuration, the seed is not a whole number,
+            or the density gives no feedback that settles at a goal.
     """
 
     name: str
     title: str
     arm: Arm
     scene: Scene
-    start: tuple[float, ...]
-    """Joint positions at the start, one number per joint [rad or m]."""
-    goal: tuple[float, ...]
-    """Joint positions of the goal, one number per joint [rad or m]."""
+    start: Array
+    """Configuration at the start (nq,); `Arm.configuration` makes one from joint positions."""
+    goal: Array
+    """Configuration to reach (nq,)."""
     control: ControlParameters = field(default_factory=ControlParameters)
     density: DensityParameters = field(default_factory=DensityParameters)
     sensing: SensingParameters = field(default_factory=SensingParameters)
@@ -110,19 +110,10 @@ class Scenario:
 
     def __post_init__(self) -> None:
         for key in ("start", "goal"):
-            object.__setattr__(self, key, finite_tuple(key, getattr(self, key), self.arm.nv))
+            q = self.arm.check_configuration(f"{key} configuration", getattr(self, key))
+            object.__setattr__(self, key, q)
         non_negative_integer("seed", self.seed)
         _check_feedback(self.control.form, self.density)
-
-    @property
-    def start_configuration(self) -> Array:
-        """The start as a configuration (nq,)."""
-        return self.arm.configuration(self.start)
-
-    @property
-    def goal_configuration(self) -> Array:
-        """The goal as a configuration (nq,)."""
-        return self.arm.configuration(self.goal)
 
     def to_json(self) -> dict[str, Any]:
         """Return JSON data that suffices to rebuild the scenario; `from_json` is its inverse."""
@@ -133,8 +124,8 @@ class Scenario:
             "robot": self.arm.description.to_json(),
             "mesh_sha256": self.arm.mesh_hashes(),
             "obstacles": self.scene.to_json(),
-            "start": list(self.start),
-            "goal": list(self.goal),
+            "start": self.arm.angles(self.start).tolist(),
+            "goal": self.arm.angles(self.goal).tolist(),
             "seed": self.seed,
             **{key: asdict(getattr(self, key)) for key in TABLES},
         }
@@ -149,13 +140,14 @@ class Scenario:
         if not isinstance(data, Mapping) or data.get("format") != FORMAT:
             raise DensarmError(f"scenario: not of format {FORMAT}")
         try:
+            arm = Arm(RobotDescription.from_json(data["robot"]))
             scenario = cls(
                 name=str(data["name"]),
                 title=str(data["title"]),
-                arm=Arm(RobotDescription.from_json(data["robot"])),
+                arm=arm,
                 scene=Scene.from_json(data["obstacles"]),
-                start=data["start"],
-                goal=data["goal"],
+                start=arm.configuration(data["start"]),
+                goal=arm.configuration(data["goal"]),
                 seed=data["seed"],
                 **{key: parse_table(key, kind, data[key]) for key, kind in TABLES.items()},
             )
@@ -225,8 +217,8 @@ def _parse(path: Path, data: dict[str, Any]) -> Scenario:
         title=str(data.get("title", path.stem)),
         arm=arm,
         scene=Scene.from_json(obstacles),
-        start=_joint_positions(arm, "task.start", task.start),
-        goal=_joint_positions(arm, "task.goal", task.goal),
+        start=_configuration(arm, "task.start", task.start),
+        goal=_configuration(arm, "task.goal", task.goal),
         seed=data.get("seed", 0),
         **{key: parse_table(key, kind, data.get(key, {})) for key, kind in TABLES.items()},
     )
@@ -287,9 +279,10 @@ def _parse_robot(folder: Path, table: _RobotTable) -> Arm:
     return Arm(replace(arm.description, **changes)) if changes else arm
 
 
-def _joint_positions(arm: Arm, key: str, value: str | tuple[float, ...]) -> tuple[float, ...]:
+def _configuration(arm: Arm, key: str, value: str | tuple[float, ...]) -> Array:
     if isinstance(value, str):
         if value not in arm.postures:
             raise UnknownNameError(f"posture for {key}", value, arm.postures)
-        return tuple(arm.angles(arm.postures[value]).tolist())
-    return finite_tuple(f"{key} (one number per joint, or a posture)", value, arm.nv)
+        return arm.postures[value]
+    name = f"{key} (one number per joint, or a posture)"
+    return arm.configuration(finite_vector(name, value, arm.nv))

@@ -56,7 +56,7 @@ class Trajectory:
     def goal_error(self) -> float:
         """Largest joint error at the end [rad or m]."""
         arm = self.scenario.arm
-        return float(np.abs(arm.difference(self.scenario.goal_configuration, self.q[-1])).max())
+        return float(np.abs(arm.difference(self.scenario.goal, self.q[-1])).max())
 
     @property
     def peak_torque_ratio(self) -> float:

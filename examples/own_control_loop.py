@@ -23,7 +23,7 @@ def main() -> None:
     controller = densarm.make_controller(scenario, plan)
 
     data = arm.model.createData()
-    q, v = scenario.start_configuration, np.zeros(arm.nv)  # [rad], [rad/s]
+    q, v = scenario.start, np.zeros(arm.nv)  # [rad], [rad/s]
     smallest = np.inf  # [m]
     for k in range(int((plan.reference.duration + SETTLING) / DT)):
         tau = controller.torque(k * DT, q, v)  # [N·m]
@@ -31,7 +31,7 @@ def main() -> None:
         q, v = pin.integrate(arm.model, q, v * DT), v + a * DT
         smallest = min(smallest, clearance.distances(q).min())
 
-    error = np.abs(arm.difference(scenario.goal_configuration, q)).max()
+    error = np.abs(arm.difference(scenario.goal, q)).max()
     print(f"{error:.1e} rad from the goal, clearance at least {smallest * 1e3:.1f} mm")
 
 

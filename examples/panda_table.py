@@ -35,8 +35,8 @@ def main(out: Path) -> None:
         title="Carry Panda's hand over a wall on a table",
         arm=arm,
         scene=scene,
-        start=[0.5, 0.3, 0.0, -2.0, 0.0, 2.3, 0.8],  # [rad]
-        goal=[-0.5, 0.3, 0.0, -2.0, 0.0, 2.3, 0.8],  # [rad]
+        start=arm.configuration([0.5, 0.3, 0.0, -2.0, 0.0, 2.3, 0.8]),  # [rad]
+        goal=arm.configuration([-0.5, 0.3, 0.0, -2.0, 0.0, 2.3, 0.8]),  # [rad]
         control=densarm.ControlParameters(margin=0.005),  # [m]
     )
     run = densarm.simulate(scenario)

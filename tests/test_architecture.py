@@ -46,6 +46,7 @@ LAYERS = (
     ("motion_plan",),
     ("closed_loop",),
     ("bench",),
+    ("study",),
     ("visualization",),
     ("__init__",),
     ("cli",),

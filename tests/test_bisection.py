@@ -54,10 +54,10 @@ def test_proved_pairs_are_not_asked_again():
     assert {count for _, count in asked[2:]} == {1}
 
 
-def test_halves_are_tried_before_quarters():
+def test_what_cannot_be_proved_is_given_up_early():
     asked = []
-    bisected([(20.0, 0.0, 0.1)], asked)
-    assert [t for t, _ in asked[:9]] == [0, 1, 1 / 2, 1 / 4, 3 / 4, 1 / 8, 3 / 8, 5 / 8, 7 / 8]
+    assert not bisected([(20.0, 1.0, 1e-6)], asked).in_contact
+    assert len(asked) < 60
 
 
 def test_failures():
@@ -68,7 +68,7 @@ def test_failures():
     touching = bisected([(1.0, np.pi - 1 / 3, 1e-9)])
     assert not touching.in_contact
     assert touching.failing.tolist() == [0]
-    assert abs(touching.failed_at - 1 / 3) <= 2 * FLOOR
+    assert abs(touching.failed_at - 1 / 3) <= 0.01  # where h is below FLOOR
 
 
 def test_no_pairs():

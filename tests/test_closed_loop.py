@@ -60,7 +60,11 @@ def test_direct_from_the_start_of_swing_up_is_stuck_at_a_critical_point(swing_up
 
 @pytest.mark.parametrize("form", ["tracking", "regulation"])
 def test_stuck_names_what_blocks(swing_up, form):
-    scenario = replace(swing_up, start=(0.01, 0.01), control=replace(swing_up.control, form=form))
+    scenario = replace(
+        swing_up,
+        start=swing_up.arm.configuration((0.01, 0.01)),
+        control=replace(swing_up.control, form=form),
+    )
     run = simulate(scenario, guide="direct")
     assert run.outcome == Outcome.STUCK
     assert "lower_link_0 and right" in run.detail
@@ -103,7 +107,11 @@ def test_no_path(swing_up):
         for k, a in enumerate(np.linspace(0.3, 2 * np.pi - 0.3, 40))
     ]
     few = replace(swing_up.planning, iterations=50, searches=1)
-    run = simulate(replace(swing_up, scene=Scene(ring), goal=(1.0, 0.5), planning=few))
+    run = simulate(
+        replace(
+            swing_up, scene=Scene(ring), goal=swing_up.arm.configuration((1.0, 0.5)), planning=few
+        )
+    )
     assert run.outcome in (Outcome.NO_PATH, Outcome.INFEASIBLE)
     assert len(run.q) == 1
 
@@ -111,7 +119,7 @@ def test_no_path(swing_up):
 def test_infeasible_start_and_goal_name_pairs_depths_joints_and_limits(panda):
     crate = Box(name="crate", size=(0.2, 0.2, 0.2), position=(0.3, 0.0, 0.5))
     ball = Sphere(name="ball", radius=0.1, position=(0.0, 0.0, 0.3))
-    start = list(panda.arm.angles(panda.arm.postures["ready"]))
+    start = panda.arm.postures["ready"]
     goal = [*panda.goal[:3], 0.5, *panda.goal[4:]]
     run = simulate(replace(panda, scene=Scene([crate, ball]), start=start, goal=goal))
     assert run.outcome == Outcome.INFEASIBLE

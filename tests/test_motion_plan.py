@@ -26,7 +26,7 @@ def planned(scenario, guide=GuideKind.PATH, form=ControlForm.TRACKING):
 def test_tracking_gets_a_reference_from_start_to_goal(swing_up):
     plan, arm = planned(swing_up), swing_up.arm
     ends = arm.configurations(plan.reference.position[[0, -1]])
-    wanted = [swing_up.start_configuration, swing_up.goal_configuration]
+    wanted = [swing_up.start, swing_up.goal]
     np.testing.assert_allclose(arm.difference(ends, np.stack(wanted)), 0.0, atol=1e-9)
     for position in plan.reference.position[::20]:
         assert (plan.bound.slack(arm.configuration(position)) > 0.0).all()
@@ -49,7 +49,11 @@ def test_goal_out_of_reach_is_no_path(swing_up):
         for k, a in enumerate(np.linspace(0.3, 2 * np.pi - 0.3, 40))
     ]
     few = replace(swing_up.planning, iterations=50, searches=1)
-    plan = planned(replace(swing_up, scene=Scene(ring), goal=(1.0, 0.5), planning=few))
+    plan = planned(
+        replace(
+            swing_up, scene=Scene(ring), goal=swing_up.arm.configuration((1.0, 0.5)), planning=few
+        )
+    )
     assert isinstance(plan, NoPath)
 
 

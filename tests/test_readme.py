@@ -28,7 +28,7 @@ def folder(tmp_path_factory):
 
 def test_fresh_machine_takes_two_commands():
     assert "pip install . && densarm run swing_up --html swing_up.html\n" in blocks("sh")
-    assert "pip install '.[test]' && pytest\n" in blocks("sh")
+    assert "pip install '.[test]' && pytest -n auto\n" in blocks("sh")
 
 
 @pytest.mark.parametrize("command", commands())

@@ -15,10 +15,10 @@ ORBIT, BALL = 0.5, 0.1  # [m], circle on which the ball of `orbiting` runs, and 
 
 
 def smooth_motion(random: np.random.Generator, count: int) -> np.ndarray:
-    """Angles (count, 2) of a random motion of about 3 rad."""
+    """Angles (count, 2) of a random motion of about 2 rad."""
     t = np.linspace(0.0, 1.0, count)[:, None]
     start, drift, size, phase = random.uniform(-np.pi, np.pi, (4, 2))
-    return start + 0.5 * drift * t + 0.5 * size * np.sin(4 * t + phase)
+    return start + 0.3 * drift * t + 0.3 * size * np.sin(4 * t + phase)
 
 
 def nearest(angles: np.ndarray, point: np.ndarray) -> np.ndarray:
@@ -35,9 +35,7 @@ def nearest(angles: np.ndarray, point: np.ndarray) -> np.ndarray:
 def refined(angles: np.ndarray) -> np.ndarray:
     """The polyline through samples at steps of at most 1e-4 rad."""
     count = int(np.ceil(np.abs(np.diff(angles, axis=0)).max() / 1e-4))
-    return np.vstack(
-        [np.linspace(a, b, count + 1) for a, b in zip(angles, angles[1:], strict=False)]
-    )
+    return np.linspace(angles[:-1], angles[1:], count + 1, axis=1).reshape(-1, 2)
 
 
 def results(gaps: np.ndarray):
@@ -48,7 +46,8 @@ def results(gaps: np.ndarray):
         while radius < 0.01:
             angles = smooth_motion(random, 200)
             point = random.uniform([-2.2, -0.3, -2.2], [2.2, 0.3, 2.2])
-            radius = nearest(refined(angles), point).min() - RADIUS - gap
+            if nearest(angles, point).min() > RADIUS + gap + 0.01:
+                radius = nearest(refined(angles), point).min() - RADIUS - gap
         ball = Sphere(name="ball", radius=radius, position=point)
         check = SweptCheck(SweptBound(Clearance(arm, Scene([ball]))))
         yield check.check(arm.configurations(angles)), nearest(angles, point) - RADIUS - radius
@@ -138,13 +137,10 @@ def test_a_curved_motion_between_clear_chords_is_caught():
     def motion(s):
         return np.column_stack([2.0 * s, 1.5 * s**2])
 
-    def speedup(s):
-        return 0.0 * s + [0.0, 3.0]
-
     dense = motion(np.linspace(0.0, 1.0, 20_000))
-    departure = np.broadcast_to(np.abs(speedup(0.0)) * (t[1] - t[0]) ** 2 / 8.0, (5, 2))
+    departure = np.tile([0.0, 3.0 * (t[1] - t[0]) ** 2 / 8.0], (5, 1))
     chords = refined(motion(t))
-    places = np.random.default_rng(0).uniform([-2.2, 0, -2.2], [2.2, 0, 2.2], (400, 3))
+    places = np.random.default_rng(0).uniform([-2.2, 0, -2.2], [2.2, 0, 2.2], (100, 3))
     caught = 0
     for point in places:
         true, straight = nearest(dense, point).min(), nearest(chords, point).min()
@@ -157,7 +153,7 @@ def test_a_curved_motion_between_clear_chords_is_caught():
         assert check.check(q).verdict == SweptVerdict.CLEAR
         assert check.check(q, departure).verdict != SweptVerdict.CLEAR
         caught += 1
-    assert caught >= 10
+    assert caught >= 5
 
 
 @pytest.mark.parametrize("gap", [0.01, -0.01])

@@ -91,7 +91,7 @@ def _swept(scenario: Scenario, q: Array, v: Array) -> Check:
 
 
 def _start(scenario: Scenario, q: Array, v: Array, time: Array) -> Check:
-    error = float(np.abs(scenario.arm.difference(scenario.start_configuration, q[0])).max())
+    error = float(np.abs(scenario.arm.difference(scenario.start, q[0])).max())
     speed = float(np.abs(v[0]).max())
     shift = float(np.abs(time - scenario.simulation.dt * np.arange(len(time))).max())
     holds = error <= _ROUNDING and speed == 0.0 and shift <= _ROUNDING
@@ -100,7 +100,7 @@ def _start(scenario: Scenario, q: Array, v: Array, time: Array) -> Check:
 
 
 def _goal(scenario: Scenario, q: Array, v: Array) -> Check:
-    error = float(np.abs(scenario.arm.difference(scenario.goal_configuration, q[-1])).max())
+    error = float(np.abs(scenario.arm.difference(scenario.goal, q[-1])).max())
     speed = float(np.abs(v[-1]).max())
     holds = error <= REACHED_POSITION and speed <= REACHED_VELOCITY
     return Check("goal", holds, f"ends {error:.2g} from the goal at {speed:.2g} rad/s")

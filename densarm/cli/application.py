@@ -4,6 +4,7 @@ import click
 
 import densarm
 from densarm.cli.bench import bench
+from densarm.cli.compare import compare
 from densarm.cli.list_known import list_known
 from densarm.cli.run import run
 from densarm.cli.verify import verify
@@ -28,5 +29,5 @@ def application() -> None:
     """  # noqa: D301
 
 
-for command in (list_known, run, view, verify, bench):
+for command in (list_known, run, view, verify, bench, compare):
     application.add_command(command)

@@ -53,6 +53,7 @@ def _is_state(
         x = q[idx_q[i]]
         if not (math.isfinite(v[i]) and math.isfinite(x)):
             return False
-        if is_circle[i] and not abs(x * x + q[idx_q[i] + 1] ** 2 - 1.0) < _UNIT_TOLERANCE:
+        y = q[idx_q[i] + 1] if is_circle[i] else 0.0
+        if is_circle[i] and not abs(x * x + y * y - 1.0) < _UNIT_TOLERANCE:
             return False
     return True

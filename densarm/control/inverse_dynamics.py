@@ -30,6 +30,7 @@ class InverseDynamics:
         self._nonlinear = self._data.nle
         self._acceleration_limit = acceleration_limit
         self._effort_limit = arm.limits.effort
+        self._workspace = np.zeros((3, arm.nv))
 
     def update(self, q: Array, v: Array) -> None:
         """Compute M and H at the state, q (nq,) and v (nv,)."""
@@ -43,14 +44,18 @@ class InverseDynamics:
 
     def torque(self, brake: Array, attract: Array) -> Array:
         """Return torque (nv,) for accelerations (nv,) [rad/s²] at the updated state."""
-        return _limited_torque(
+        tau = np.empty_like(self._effort_limit)
+        _limited_torque(
             self._mass,
             self._nonlinear,
             brake,
             attract,
             self._acceleration_limit,
             self._effort_limit,
+            self._workspace,
+            tau,
         )
+        return tau
 
 
 @compiled
@@ -83,18 +88,19 @@ def _limited_torque(
     attract: Array,
     acceleration_limit: Array,
     effort_limit: Array,
-) -> Array:
+    workspace: Array,
+    out: Array,
+) -> None:
     nv = nonlinear.shape[0]
-    gamma, beta = _shares(np.zeros(nv), brake, attract, acceleration_limit)
-    brake_torque, attract_torque = np.zeros(nv), np.zeros(nv)
+    zero, brake_torque, attract_torque = workspace[0], workspace[1], workspace[2]
+    gamma, beta = _shares(zero, brake, attract, acceleration_limit)
     for i in range(nv):
+        brake_torque[i] = attract_torque[i] = 0.0
         for j in range(nv):
             entry = mass[i, j] if i <= j else mass[j, i]  # crba fills the upper triangle
             brake_torque[i] += entry * gamma * brake[j]
             attract_torque[i] += entry * beta * attract[j]
     gamma, beta = _shares(nonlinear, brake_torque, attract_torque, effort_limit)
-    tau = np.empty(nv)
     for i in range(nv):
         wanted = nonlinear[i] + gamma * brake_torque[i] + beta * attract_torque[i]
-        tau[i] = min(max(wanted, -effort_limit[i]), effort_limit[i])
-    return tau
+        out[i] = min(max(wanted, -effort_limit[i]), effort_limit[i])

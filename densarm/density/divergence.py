@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -42,7 +43,7 @@ class RantzerCondition:
 
 
 def rantzer_condition(
-    density: NavigationDensity,
+    density: NavigationDensity[Any],
     q: Array,
     integrate: Callable[[Array, Array], Array],
     step: float = 1e-5,

@@ -167,7 +167,8 @@ class Egg:
 class CShape:
     r"""A ring without its part beyond a line, with round ends: open towards +x₁.
 
-    .. math:: \left(\frac{\|x\|^2 - R^2}{2 R w}\right)^2 + e^{k (x_1 - o)} - 1
+    .. math:: \left(\frac{\|x\|^2 - R^2}{2 R w}\right)^2
+        + \ln^2\!\left(1 + e^{k (x_1 - o)}\right) - 1
     """
 
     radius: float
@@ -187,20 +188,22 @@ class CShape:
 
     def __call__(self, x: Array) -> Array:
         """Act as `ImplicitFunction.__call__`."""
-        return self._across(x) ** 2 + self._along(x) - 1.0
+        return self._across(x) ** 2 + np.logaddexp(0.0, self._beyond(x)) ** 2 - 1.0
 
     def gradient(self, x: Array) -> Array:
         """Act as `ImplicitFunction.gradient`."""
         gradient = 2.0 * self._across(x)[..., None] * x / (self.radius * self.half_width)
-        gradient[..., 0] += self.sharpness * self._along(x)
+        beyond = self._beyond(x)
+        rise = np.logaddexp(0.0, beyond)
+        gradient[..., 0] += 2.0 * self.sharpness * rise * np.exp(beyond - rise)
         return gradient
 
     def _across(self, x: Array) -> Array:
         scale = 2.0 * self.radius * self.half_width
         return (np.sum(x * x, axis=-1) - self.radius**2) / scale  # type: ignore[no-any-return]
 
-    def _along(self, x: Array) -> Array:
-        return np.exp(self.sharpness * (x[..., 0] - self.opening))
+    def _beyond(self, x: Array) -> Array:
+        return self.sharpness * (x[..., 0] - self.opening)  # type: ignore[no-any-return]
 
 
 @dataclass(frozen=True)

@@ -3,6 +3,7 @@
 import numpy as np
 
 from densarm.arrays import Array
+from densarm.clearance import Clearance
 from densarm.fields.guided_density import GuidedDensity
 from densarm.fields.speed_law import SpeedLaw
 
@@ -28,6 +29,11 @@ class DensityField:
         self._rate = rate
         self._gradient = np.zeros(guided.clearance.arm.nv)
 
+    @property
+    def clearance(self) -> Clearance:
+        """As `VelocityField.clearance`."""
+        return self.guided.clearance
+
     def update(self, q: Array, metric: Array | None = None) -> Array:
         """Return k(q) and move on along the sub-goals.
 
@@ -46,7 +52,4 @@ class DensityField:
         velocity = self._rate * self._gradient
         if metric is not None:
             velocity = np.asarray(np.linalg.solve(metric, velocity), dtype=np.float64)
-        norm = float(np.sqrt(velocity @ velocity))
-        way = guided.way_left(q)
-        speed = self.speed_law.speed(velocity / norm, guided.clearance.distance, way)
-        return velocity * min(1.0, speed / norm)
+        return self.speed_law.limit(velocity, self.clearance.distance, guided.way_left(q))

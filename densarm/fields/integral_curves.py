@@ -172,7 +172,9 @@ class _Front:
         system = np.eye(x.shape[-1]) - _DAMPING * size[..., np.newaxis] * self._jacobian(x)
 
         def solve(right: Array) -> Array:
-            return np.linalg.solve(system, right[..., np.newaxis])[..., 0]
+            k = np.linalg.solve(system, right[..., np.newaxis])[..., 0]
+            # The field has length one: a longer k is of a singular system, far off the curve.
+            return k / np.maximum(np.linalg.norm(k, axis=-1, keepdims=True) / _LONGEST_K, 1.0)
 
         k1 = solve(f0)
         f1 = self._unit_at(x + 0.5 * size * k1)
@@ -221,6 +223,7 @@ class _Front:
 
 _DIFFERENCE = 1e-8  # of points for the Jacobian [m]
 _DAMPING = 1.0 / (2.0 + np.sqrt(2.0))  # makes the method L-stable
+_LONGEST_K = 4.0
 _ERROR_WEIGHT = 6.0 + np.sqrt(2.0)
 
 

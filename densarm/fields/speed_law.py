@@ -71,6 +71,19 @@ class SpeedLaw:
             )
         )
 
+    def limit(self, velocity: Array, distance: Array, way_left: float) -> Array:
+        """Return a velocity (nv,), shortened to the speed s along it where it is faster.
+
+        Args:
+            velocity: shape (nv,) [rad/s or m/s].
+            distance: signed distances of all pairs (K,) [m].
+            way_left: length ℓ of the way to the goal [rad].
+        """
+        norm = float(np.sqrt(velocity @ velocity))
+        if norm == 0.0:
+            return velocity
+        return velocity * min(1.0, self.speed(velocity / norm, distance, way_left) / norm)
+
     def must_brake(self, v: Array, distance: Array, reaction: float) -> bool:
         """Return whether the full straight-line brake from v would leave the proved free space.
 

@@ -64,26 +64,22 @@ def _hermite(
     u: float, u_acceleration: float, period: float, position: Array, velocity: Array, out: Array
 ) -> None:
     last = position.shape[0] - 1
+    u = min(max(u, 0.0), float(last))
+    k = min(int(u), last - 1)
+    x = u - k
+    step, bump = x * x * (3.0 - 2.0 * x), x * (1.0 - x)
+    step_slope = 6.0 * bump / period
+    moves = 0.0 <= u_acceleration < last
+    m = int(u_acceleration) if moves else 0
+    y = u_acceleration - m
     for j in range(position.shape[1]):
-        out[0, j] = position[0, j] if u < 0.0 else position[last, j]
-        out[1, j] = 0.0
+        a, b = position[k, j], position[k + 1, j]
+        va, vb = velocity[k, j], velocity[k + 1, j]
+        out[0, j] = a + step * (b - a) + period * bump * ((1.0 - x) * va - x * vb)
+        out[1, j] = step_slope * (b - a) + (1.0 - x) * (1.0 - 3.0 * x) * va
+        out[1, j] += x * (3.0 * x - 2.0) * vb
         out[2, j] = 0.0
-        if 0.0 <= u < last:
-            x = u - int(u)
-            a, va, c2, c3 = _cubic(int(u), j, period, position, velocity)
-            out[0, j] = a + x * (va + x * (c2 + x * c3))
-            out[1, j] = (va + x * (2.0 * c2 + 3.0 * x * c3)) / period
-        if 0.0 <= u_acceleration < last:
-            x = u_acceleration - int(u_acceleration)
-            _, _, c2, c3 = _cubic(int(u_acceleration), j, period, position, velocity)
-            out[2, j] = (2.0 * c2 + 6.0 * x * c3) / (period * period)
-
-
-@compiled
-def _cubic(
-    k: int, j: int, period: float, position: Array, velocity: Array
-) -> tuple[float, float, float, float]:
-    """Return the coefficients of joint j's polynomial between samples k and k + 1."""
-    a, b = position[k, j], position[k + 1, j]
-    va, vb = velocity[k, j] * period, velocity[k + 1, j] * period
-    return a, va, 3.0 * (b - a) - 2.0 * va - vb, 2.0 * (a - b) + va + vb
+        if moves:
+            rise = (position[m + 1, j] - position[m, j]) / period
+            slopes = (6.0 * y - 4.0) * velocity[m, j] + (6.0 * y - 2.0) * velocity[m + 1, j]
+            out[2, j] = ((6.0 - 12.0 * y) * rise + slopes) / period

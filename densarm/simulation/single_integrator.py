@@ -92,8 +92,9 @@ def run_points(
     u_max: float,
     time_limit: float,
     reach_radius: float,
+    gain: float = 1.0,
 ) -> PointRuns:
-    """Run u = k(x), saturated, on many single integrators until each has ended.
+    """Run u = gain · k(x), saturated, on many single integrators until each has ended.
 
     Args:
         field: k, the goal and the obstacles.
@@ -102,6 +103,7 @@ def run_points(
         u_max: bound of each component of u [m/s]; infinity for none.
         time_limit: time after which a run ends [s].
         reach_radius: distance from the goal at which a run has reached it [m].
+        gain: factor > 0 of the field before the bound, [m/s] per unit of k.
 
     Returns:
         All samples of all runs. The first of reaching the goal and entering an obstacle counts.
@@ -118,7 +120,7 @@ def run_points(
         active &= outcome == Outcome.TIMED_OUT
         u = np.zeros_like(x)
         if active.any():
-            u[active] = saturate(field.direction(x[active]), u_max)
+            u[active] = saturate(gain * field.direction(x[active]), u_max)
         controls.append(u)
         if not active.any():
             break

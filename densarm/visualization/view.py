@@ -19,7 +19,7 @@ def view(run: Trajectory, on_url: Callable[[str], object] = print) -> None:
         KeyboardInterrupt: on Ctrl-C.
     """
     scenario = run.scenario
-    goal = scenario.goal_configuration
+    goal = scenario.goal
     play(scenario.arm, scenario.scene, run.time, run.q, goal, on_url=on_url)
 
 
@@ -40,7 +40,7 @@ def save_html(run: Trajectory, path: str | Path) -> None:
         scenario.scene,
         run.time,
         run.q,
-        scenario.goal_configuration,
+        scenario.goal,
         title=scenario.title,
         subtitle=f"{run.outcome.description} {run.detail}".strip(),
     )

@@ -25,21 +25,26 @@ def tampered(run, name, row, column, change):
     return replace(run, **{name: array})
 
 
+def moved(run, **angles):
+    """Return a run's scenario with another start or goal, given in joint angles."""
+    ends = {key: run.scenario.arm.configuration(value) for key, value in angles.items()}
+    return replace(run.scenario, **ends)
+
+
 def test_an_honest_run(swing_up_run):
     assert failing(swing_up_run) == set()
     assert swing_up_run.certified
 
 
 def test_start_moved(swing_up_run):
-    scenario = replace(swing_up_run.scenario, start=(1e-6, 0.0))
+    scenario = moved(swing_up_run, start=(1e-6, 0.0))
     assert failing(replace(swing_up_run, scenario=scenario)) == {"start"}
 
 
 def test_start_in_motion(swing_up_run):
     cut = {name: getattr(swing_up_run, name)[500:] for name in ("q", "v", "tau", "clearance")}
     time = swing_up_run.time[: len(cut["q"])]
-    start = tuple(swing_up_run.scenario.arm.angles(cut["q"][0]))
-    scenario = replace(swing_up_run.scenario, start=start)
+    scenario = replace(swing_up_run.scenario, start=cut["q"][0])
     assert failing(replace(swing_up_run, scenario=scenario, time=time, **cut)) == {"start"}
 
 
@@ -49,14 +54,13 @@ def test_another_time_grid(swing_up_run, factor):
 
 
 def test_goal_missed(swing_up_run):
-    scenario = replace(swing_up_run.scenario, goal=(3.13, 0.02))
+    scenario = moved(swing_up_run, goal=(3.13, 0.02))
     assert failing(replace(swing_up_run, scenario=scenario)) == {"goal"}
 
 
 def test_ends_in_motion(swing_up_run):
     cut = {name: getattr(swing_up_run, name)[:1000] for name in ("time", "q", "v", "tau")}
-    goal = tuple(swing_up_run.scenario.arm.angles(cut["q"][-1]))
-    scenario = replace(swing_up_run.scenario, goal=goal)
+    scenario = replace(swing_up_run.scenario, goal=cut["q"][-1])
     assert failing(replace(swing_up_run, scenario=scenario, **cut)) == {"goal"}
 
 
@@ -116,10 +120,10 @@ def test_obstacle_between_two_samples(swing_up_run):
     few = {name: getattr(run, name)[ends] for name in ("q", "v", "tau")}
     scenario = replace(
         run.scenario,
-        goal=(2.0, 0.0),
+        goal=arm.configuration((2.0, 0.0)),
         scene=Scene([Sphere(name="pinhead", radius=1e-3, position=(1.6, 0.0, -1.0))]),
     )
-    few["q"] = np.stack([scenario.start_configuration, arm.configuration((2.0, 0.0))])
+    few["q"] = np.stack([scenario.start, scenario.goal])
     certificate = certify(scenario, run.time[:2], **few)
     swept, replay = certificate.checks[0], certificate.checks[-1]
     assert not swept.holds

@@ -17,4 +17,4 @@ def test_view_plays_the_run_and_tells_the_address(command, swing_up, monkeypatch
     assert (name, n_obstacles) == ("two_link", 2)
     assert (time == run.time).all()
     assert (q == run.q).all()
-    assert (goal == run.scenario.goal_configuration).all()
+    assert (goal == run.scenario.goal).all()

@@ -42,7 +42,7 @@ def test_torque_from_any_state(setting, t, angles, v):
 
 def test_torque_is_the_callers_own(setting):
     scenario, controller = setting
-    q = scenario.start_configuration
+    q = scenario.start
     first = controller.torque(0.0, q, np.zeros(2))
     kept = first.copy()
     controller.torque(0.1, q, np.ones(2))
@@ -51,7 +51,7 @@ def test_torque_is_the_callers_own(setting):
 
 def test_plain_lists_are_states_too(setting):
     scenario, controller = setting
-    assert controller.torque(0.0, scenario.start_configuration.tolist(), [0, 0]).shape == (2,)
+    assert controller.torque(0.0, scenario.start.tolist(), [0, 0]).shape == (2,)
 
 
 @pytest.mark.parametrize(
@@ -75,13 +75,13 @@ def test_reaches_the_goal_in_a_loop_of_ones_own():
     arm, clearance = scenario.arm, Clearance(scenario.arm, scenario.scene)
     controller = make_controller(scenario, plan_motion(scenario, clearance, GuideKind.PATH))
     data, dt = arm.model.createData(), 0.001
-    q, v = scenario.start_configuration, np.zeros(arm.nv)
+    q, v = scenario.start, np.zeros(arm.nv)
     for k in range(2500):
         tau = controller.torque(k * dt, q, v)
         v = v + dt * pin.aba(arm.model, data, q, v, tau)
         q = pin.integrate(arm.model, q, dt * v)
         assert clearance.distances(q).min() > 0.0
-    assert np.abs(arm.difference(q, scenario.goal_configuration)).max() < 1e-3
+    assert np.abs(arm.difference(q, scenario.goal)).max() < 1e-3
     assert np.abs(v).max() < 1e-3
 
 

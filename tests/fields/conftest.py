@@ -24,13 +24,13 @@ def make_guided(swing_up):
     def make(guide="path", start=None, goal=None, scene=None, margin=0.0, **parameters):
         scenario = replace(
             swing_up,
-            start=swing_up.start if start is None else start,
-            goal=swing_up.goal if goal is None else goal,
+            start=swing_up.start if start is None else swing_up.arm.configuration(start),
+            goal=swing_up.goal if goal is None else swing_up.arm.configuration(goal),
             scene=swing_up.scene if scene is None else scene,
         )
         bound = SweptBound(Clearance(scenario.arm, scenario.scene), margin)
         guide = DirectGuide() if guide == "direct" else PathGuide(scenario.arm, bound)
-        path = guide.plan(scenario.start_configuration, scenario.goal_configuration, 0)
+        path = guide.plan(scenario.start, scenario.goal, 0)
         chain = SubGoalChain(bound, path, SensingParameters())
         density = DensityParameters(**parameters)
         return bound, GuidedDensity(bound.clearance, chain, margin, density, 1.0)

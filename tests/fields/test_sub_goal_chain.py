@@ -21,8 +21,8 @@ def bound_and_chain(make_guided):
 
 def test_path_runs_from_start_to_goal(swing_up, bound_and_chain):
     bound, chain = bound_and_chain
-    np.testing.assert_array_equal(chain.q[0], swing_up.start_configuration)
-    np.testing.assert_allclose(chain.q[-1], swing_up.goal_configuration, atol=1e-15)
+    np.testing.assert_array_equal(chain.q[0], swing_up.start)
+    np.testing.assert_allclose(chain.q[-1], swing_up.goal, atol=1e-15)
     steps = bound.arm.difference(chain.q[:-1], chain.q[1:])
     assert np.abs(steps).max() <= chain.SPACING + 1e-12
     assert chain.remaining[0] == pytest.approx(np.linalg.norm(steps, axis=1).sum())

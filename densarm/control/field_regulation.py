@@ -1,4 +1,4 @@
-"""DensityRegulation: the density inverse-dynamics controller towards a constant goal."""
+"""FieldRegulation: the inverse-dynamics controller that follows a planning system."""
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -8,17 +8,17 @@ from densarm.arrays import Array
 from densarm.control.controller import checked_state
 from densarm.control.gains import Gains
 from densarm.control.inverse_dynamics import InverseDynamics
-from densarm.fields.density_field import DensityField
+from densarm.fields.velocity_field import VelocityField
 
 
-class DensityRegulation:
-    r"""Regulate to the goal by way of the sub-goals, without a reference in time.
+class FieldRegulation:
+    r"""Regulate to the goal along a velocity field, without a reference in time.
 
-    .. math:: \tau = H + M K_v (k(q) - \dot q), \qquad k = \frac{K_p}{K_v} \nabla\rho
-        \text{ at the speed of the speed law}
+    .. math:: \tau = H + M K_v (k(q) - \dot q)
 
-    which is [ZNV] eq. 17 with a constant q_d, its attraction scaled before its damping. Where the
-    full brake would leave the free space ahead, the arm brakes in a straight line.
+    With the field of the density, k = (K_p/K_v) ∇ρ at the speed of the speed law, this is [ZNV]
+    eq. 17 with a constant q_d, its attraction scaled before its damping. Where the full brake
+    would leave the free space ahead, the arm brakes in a straight line.
 
     Args:
         arm: the arm.
@@ -29,7 +29,7 @@ class DensityRegulation:
     Source: [ZNV] eq. 17.
     """
 
-    def __init__(self, arm: Arm, field: DensityField, gains: Gains, period: float) -> None:
+    def __init__(self, arm: Arm, field: VelocityField, gains: Gains, period: float) -> None:
         self._arm = arm
         self._field = field
         self._gain = gains.velocity
@@ -41,7 +41,7 @@ class DensityRegulation:
         q, v = checked_state(self._arm, q, v)
         attract = self._gain * self._field.update(q)
         self._dynamics.update(q, v)
-        distance = self._field.guided.clearance.distance
+        distance = self._field.clearance.distance
         if self._field.speed_law.must_brake(v, distance, 2.0 * self._period):
             return self._dynamics.torque(-v / self._period, np.zeros_like(v))
         return self._dynamics.torque(-self._gain * v, attract)

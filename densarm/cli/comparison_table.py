@@ -1,0 +1,56 @@
+"""The table of a comparison."""
+
+from collections.abc import Sequence
+
+from rich.box import SIMPLE
+from rich.console import Console
+from rich.table import Table
+from rich.text import Text
+
+from densarm.outcome import Outcome
+from densarm.study.comparison import OUTCOMES, Comparison, MethodResult
+
+_SHOWN = (Outcome.REACHED, Outcome.COLLIDED, Outcome.STUCK, Outcome.TIMED_OUT)
+_COLUMNS = {
+    "time\n[s]": ("time_s", 1.0, ".2f"),
+    "path\n[rad]": ("path_length_rad", 1.0, ".2f"),
+    "clearance\n[mm]": ("min_clearance_m", 1e3, ".1f"),
+    "effort\n[N²m²s]": ("effort", 1.0, ".0f"),
+    "planning\n[s]": ("plan_time_s", 1.0, ".2f"),
+    "step\n[µs]": ("step_us", 1.0, ".0f"),
+}
+_WIDTH = 120  # characters, at least, so that no number is cut; a narrow terminal breaks the lines
+
+
+def print_comparison(comparison: Comparison) -> None:
+    """Print one row a method: how its runs ended, and the medians of its measures."""
+    table = Table(
+        title=f"{comparison.scenario}, {comparison.starts} starts, seed {comparison.seed}",
+        caption="Medians: of the step over all runs, else over the runs that reached the goal.",
+        box=SIMPLE,
+        padding=(0, 1, 0, 0),
+        title_justify="left",
+        caption_justify="left",
+    )
+    table.add_column("method", no_wrap=True)
+    words = [str(outcome).replace("_", "\n") for outcome in _SHOWN]
+    for heading in (*words, "other", *_COLUMNS):
+        table.add_column(Text(heading), justify="right")
+    for result in comparison.methods:
+        table.add_row(*_row(result))
+    width = max(Console().width, _WIDTH)
+    Console(width=width, highlight=False).print(table)
+
+
+def _row(result: MethodResult) -> Sequence[str]:
+    shown = [result.count(outcome) for outcome in _SHOWN]
+    other = sum(result.count(outcome) for outcome in OUTCOMES) - sum(shown)
+    counts = [str(count) for count in (*shown, other)]
+    measures = [
+        _number(result.median(measure), scale, form) for measure, scale, form in _COLUMNS.values()
+    ]
+    return [result.method, *counts, *measures]
+
+
+def _number(value: float | None, scale: float, form: str) -> str:
+    return "–" if value is None else format(scale * value, form)

@@ -1,0 +1,200 @@
+"""Comparison: every method from every start, under the same limits, distances and seeds."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from densarm.arrays import Array
+from densarm.clearance import Clearance
+from densarm.closed_loop import Drive, OnProgress, run_closed_loop
+from densarm.errors import UnknownNameError
+from densarm.guides.guide import NoPath
+from densarm.outcome import Outcome
+from densarm.scenario import Scenario
+from densarm.study.methods import METHODS
+from densarm.study.starts import random_starts
+from densarm.study.timed_controller import TimedController
+from densarm.trajectory import Trajectory
+from densarm.validation import positive_integer
+
+FAILED = "failed"
+"""In place of an outcome: the run raised an error."""
+
+OUTCOMES = (*(str(outcome) for outcome in Outcome), FAILED)
+"""How a run of a comparison can end."""
+
+
+@dataclass(frozen=True)
+class MethodRun:
+    """One method from one start."""
+
+    start: tuple[float, ...]
+    """Joint positions [rad or m]."""
+    outcome: str
+    """One of `OUTCOMES`."""
+    detail: str
+    """What stood in the way, in a phrase."""
+    time_s: float | None = None
+    """Simulated time to the end of the run [s]; None where it failed."""
+    path_length_rad: float | None = None
+    """Length of the way in joint space [rad]."""
+    min_clearance_m: float | None = None
+    """Smallest distance of any pair on the way [m]; None without pairs."""
+    effort: float | None = None
+    """∫ ‖τ‖² dt [N²m²s]."""
+    plan_time_s: float | None = None
+    """Wall-clock time before the first torque [s]."""
+    step_us: float | None = None
+    """Median wall-clock time of one call of the controller [µs]; None where it had none."""
+
+    def to_json(self) -> dict[str, Any]:
+        """Return JSON data."""
+        return {**vars(self), "start": list(self.start)}
+
+
+MEASURES = (
+    "time_s",
+    "path_length_rad",
+    "min_clearance_m",
+    "effort",
+    "plan_time_s",
+    "step_us",
+)
+"""What is measured on a run, as `MethodRun` calls it."""
+
+
+@dataclass(frozen=True)
+class MethodResult:
+    """One method from all starts."""
+
+    method: str
+    runs: tuple[MethodRun, ...]
+
+    def count(self, outcome: str) -> int:
+        """Return the number of runs that ended so."""
+        return sum(run.outcome == outcome for run in self.runs)
+
+    def values(self, measure: str) -> list[float]:
+        """Return a measure of the runs that reached the goal; step_us of all runs."""
+        runs = [r for r in self.runs if measure == "step_us" or r.outcome == Outcome.REACHED]
+        return [value for run in runs if (value := getattr(run, measure)) is not None]
+
+    def median(self, measure: str) -> float | None:
+        """Return the median of `values`, None without any."""
+        values = self.values(measure)
+        return float(np.median(values)) if values else None
+
+    def to_json(self) -> dict[str, Any]:
+        """Return JSON data."""
+        return {
+            "method": self.method,
+            **{outcome: self.count(outcome) for outcome in OUTCOMES},
+            **{measure: self.median(measure) for measure in MEASURES},
+            "runs": [run.to_json() for run in self.runs],
+        }
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """All methods from all starts."""
+
+    scenario: str
+    seed: int
+    methods: tuple[MethodResult, ...]
+
+    @property
+    def starts(self) -> int:
+        """Number of starts."""
+        return len(self.methods[0].runs)
+
+    def to_json(self) -> dict[str, Any]:
+        """Return JSON data; the measures of a method are medians."""
+        return {
+            "methods": [result.to_json() for result in self.methods],
+            "starts": self.starts,
+            "scenario": self.scenario,
+            "seed": self.seed,
+        }
+
+
+def compare(
+    scenario: Scenario,
+    methods: Sequence[str] = tuple(METHODS),
+    starts: int = 5,
+    seed: int | None = None,
+    on_progress: OnProgress = lambda _: None,
+) -> Comparison:
+    """Run methods from the same starts to the scenario's goal.
+
+    Args:
+        scenario: arm, scene, goal, limits and parameters; its own start comes first.
+        methods: names of `METHODS`, at least one.
+        starts: number of starts; all but the first are random and touch nothing.
+        seed: of the starts and of the planner; None for the scenario's own.
+        on_progress: told what is being done.
+
+    Returns:
+        How each run ended. A run that raises an error counts as failed and stops no other.
+
+    Raises:
+        UnknownNameError: a method that there is not.
+        InvalidValueError: a number of starts below one, or a seed that is not a whole number.
+        DensarmError: no random start was found.
+    """
+    for name in methods:
+        if name not in METHODS:
+            raise UnknownNameError("method", name, METHODS)
+    scenario = replace(scenario, seed=scenario.seed if seed is None else seed)
+    clearance = Clearance(scenario.arm, scenario.scene)
+    others = random_starts(
+        scenario, clearance, positive_integer("starts", starts) - 1, scenario.seed
+    )
+    results = []
+    for name in dict.fromkeys(methods):
+        runs = []
+        for k, start in enumerate([scenario.start, *others]):
+            on_progress(f"{name} from start {k + 1} of {starts}")
+            runs.append(_run(replace(scenario, start=start), name))
+        results.append(MethodResult(name, tuple(runs)))
+    return Comparison(scenario.name, scenario.seed, tuple(results))
+
+
+def _run(scenario: Scenario, name: str) -> MethodRun:
+    timed: list[TimedController] = []
+
+    def method(scenario: Scenario, clearance: Clearance) -> Drive | NoPath:
+        drive = METHODS[name](scenario, clearance)
+        if isinstance(drive, NoPath):
+            return drive
+        timed.append(TimedController(drive.controller))
+        return replace(drive, controller=timed[0])
+
+    try:
+        run = run_closed_loop(scenario, method)
+    except (ValueError, ArithmeticError, RuntimeError) as error:
+        return MethodRun(_positions(scenario), FAILED, str(error))
+    seconds = timed[0].seconds if timed else []
+    return _measured(run, float(np.median(seconds)) * 1e6 if seconds else None)
+
+
+def _measured(run: Trajectory, step_us: float | None) -> MethodRun:
+    arm, dt = run.scenario.arm, run.scenario.simulation.dt
+    smallest = float(run.clearance.min())
+    steps: Array = arm.difference(run.q[:-1], run.q[1:])
+    return MethodRun(
+        start=_positions(run.scenario),
+        outcome=str(run.outcome),
+        detail=run.detail,
+        time_s=float(run.time[-1]),
+        path_length_rad=float(np.linalg.norm(steps, axis=1).sum()),
+        min_clearance_m=smallest if np.isfinite(smallest) else None,
+        effort=float((run.tau[:-1] ** 2).sum() * dt),
+        plan_time_s=run.plan_time,
+        step_us=step_us,
+    )
+
+
+def _positions(scenario: Scenario) -> tuple[float, ...]:
+    return tuple(scenario.arm.angles(scenario.start).tolist())

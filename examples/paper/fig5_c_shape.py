@@ -1,0 +1,126 @@
+"""Fig. 5: out of a C-shaped unsafe set, density functions against navigation functions."""
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from densarm.arrays import Array
+from densarm.density.euclidean_density import EuclideanDensity
+from densarm.density.gauge import Gauge
+from densarm.density.implicit_function import Complement, UnsafeRegion
+from densarm.density.implicit_shapes import Ball, CShape, Egg
+from densarm.density.navigation_density import DensityParameters
+from densarm.fields.integral_curves import integral_curves
+from densarm.fields.navigation_field import NavigationField
+from densarm.fields.navigation_function import NavigationFunction
+from densarm.fields.potential_field import PotentialField
+from densarm.outcome import Outcome
+from densarm.simulation.proportion import Proportion
+from densarm.visualization import figure_style as style
+from densarm.visualization.figure_report import FigureReport, figure_arguments
+
+GOAL = np.array([-9.0, 1.0])  # behind the closed side of the C [m]
+C_SHAPE = CShape(radius=2.2, half_width=0.4, opening=0.0, sharpness=2.0)
+CLOSED_C = CShape(radius=2.6, half_width=0.45, opening=1.3, sharpness=4.0)
+WORLD = Complement(Ball(radius=25.0))  # [m]
+EXTENT = (-12.0, 8.0, -10.0, 10.0)  # [m]
+SHOWN = 40
+
+
+def density(shape: CShape, radius: float) -> EuclideanDensity:
+    sensed = Egg(a=1.0, b=1.0, c=1.1, radius=radius)
+    parameters = DensityParameters(gauge=Gauge.LOG)
+    return EuclideanDensity([UnsafeRegion(h=shape, s=sensed)], GOAL, parameters)
+
+
+def navigation_function(kappa: float) -> NavigationFunction:
+    return NavigationFunction([C_SHAPE, WORLD], GOAL, kappa)
+
+
+FIELDS: dict[str, NavigationField] = {
+    "density, r = 2.5": density(C_SHAPE, 2.5),
+    "navigation function, κ = 1": navigation_function(1.0),
+    "density, r = 4.5": density(C_SHAPE, 4.5),
+    "navigation function, κ = 10": navigation_function(10.0),
+}
+BEYOND: dict[str, NavigationField] = {
+    "navigation function, κ = 100": navigation_function(100.0),
+    "potential field, h_0 = 4": PotentialField([C_SHAPE], GOAL, influence=4.0),
+    "density, r = 4.5, tips of the C turned in": density(CLOSED_C, 4.5),
+}
+
+
+def cavity_starts(shape: CShape, count: int) -> Array:
+    """Random starts inside the C: in its ring, short of its opening, off the unsafe set."""
+    points = np.random.default_rng(5).uniform(-shape.radius, shape.radius, (8 * count + 50, 2))
+    inside = (np.linalg.norm(points, axis=1) < shape.radius) & (points[:, 0] < shape.opening)
+    return points[inside & (shape(points) > 0.0)][:count]
+
+
+def rates(field: NavigationField, count: int) -> dict[str, object]:
+    shape = next(h for h in field.obstacles if isinstance(h, CShape))
+    curves = integral_curves(field, cavity_starts(shape, count))
+    reached = Proportion(curves.count(Outcome.REACHED), count)
+    return {
+        "reached": reached.count,
+        "reached_rate_95": reached.interval,
+        "stuck": curves.count(Outcome.STUCK),
+        "collided": curves.count(Outcome.COLLIDED),
+        "timed_out": curves.count(Outcome.TIMED_OUT),
+        "ends_m": np.unique(np.round(curves.end, 1), axis=0)[:8].tolist(),
+    }
+
+
+def covered_share(radius: float) -> float:
+    """Share of the C's area inside the egg."""
+    x = np.stack(style.plane_grid((-4.0, 4.0, -4.0, 4.0)), axis=-1)
+    sensed = Egg(a=1.0, b=1.0, c=1.1, radius=radius)(x) < 0.0
+    return float(sensed[C_SHAPE(x) <= 0.0].mean())
+
+
+def draw(numbers: dict[str, dict[str, object]], starts: int) -> Figure:
+    figure = style.new_figure(9.0, 9.4)
+    axes = figure.subplots(2, 2).ravel()
+    for letter, ax, (name, field) in zip("abcd", axes, FIELDS.items(), strict=True):
+        curves = integral_curves(field, cavity_starts(C_SHAPE, SHOWN), record=True)
+        reached = Proportion(int(str(numbers[name]["reached"])), starts)
+        style.plane_axes(ax, EXTENT, f"({letter}) {name}: {100 * reached.rate:.1f} % reach")
+        if isinstance(field, EuclideanDensity):
+            style.outline_sensing(ax, [field.unsafe[0].s], EXTENT)
+        style.shade_unsafe(ax, [C_SHAPE], EXTENT)
+        style.draw_curves(ax, curves.paths, style.outcome_colours(curves.outcome))
+        starts_shown = np.array([path[0] for path in curves.paths])
+        ax.plot(*starts_shown.T, ".", color=style.BLACK, markersize=3, zorder=5, label="starts")
+        for outcome in sorted(set(curves.outcome)):
+            colour = style.OUTCOME_COLOUR[Outcome(outcome)]
+            ends = curves.end[curves.outcome == outcome]
+            if outcome != Outcome.REACHED:
+                ax.plot(*ends.T, "X", color=colour, markersize=6, zorder=6, label=str(outcome))
+        style.mark_goal(ax, GOAL)
+        ax.legend(loc="lower right")
+    return figure
+
+
+def main(arguments: list[str] | None = None) -> None:
+    options = figure_arguments(__doc__, starts=1000, arguments=arguments)
+    numbers = {
+        name: rates(field, options.starts) for name, field in {**FIELDS, **BEYOND}.items()
+    }
+    style.save_figure(draw(numbers, options.starts), options.out, "fig5_c_shape")
+    reached = {name: numbers[name]["reached"] for name in FIELDS}
+    enclosing = reached.pop("density, r = 4.5")
+    FigureReport(
+        "Fig. 5",
+        "From random starts inside a C-shaped unsafe set the density whose sensing region encloses "
+        "it (r = 4.5) reaches the goal always; with r = 2.5, and by navigation functions with "
+        "kappa = 1 and 10 in a sphere world of radius 25 m, some starts do not.",
+        enclosing == options.starts and all(n < options.starts for n in reached.values()),
+        {
+            "starts": options.starts,
+            "share_of_c_inside_egg": {str(r): covered_share(r) for r in (2.5, 4.5)},
+            **numbers,
+        },
+    ).write(options.out)
+
+
+if __name__ == "__main__":
+    main()

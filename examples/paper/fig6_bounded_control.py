@@ -1,0 +1,106 @@
+"""Fig. 6: the gradient of the density as control, bounded to u_max in the maximum norm."""
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from densarm.arrays import Array
+from densarm.density.euclidean_density import EuclideanDensity
+from densarm.density.gauge import Gauge
+from densarm.density.implicit_function import Placed, UnsafeRegion, smallest_value
+from densarm.density.implicit_shapes import Ball
+from densarm.density.navigation_density import DensityParameters
+from densarm.outcome import Outcome
+from densarm.simulation.proportion import Proportion
+from densarm.simulation.single_integrator import PointRuns, SingleIntegrator, run_points
+from densarm.visualization import figure_style as style
+from densarm.visualization.figure_report import FigureReport, figure_arguments
+
+U_MAX = 0.2  # [m/s]
+GAIN = 5.0  # factor of the gradient of the density, whose own speed far away is a few cm/s
+DT, TIME_LIMIT, REACH_RADIUS = 0.02, 120.0, 0.01  # [s], [s], [m]
+GOAL = np.array([2.5, -1.5])  # [m]
+CENTRES = ((0.0, 0.0), (-0.8, -2.2), (1.2, 1.8))  # of discs of radius 0.5, sensed within 1.0 [m]
+EXTENT = (-4.0, 4.0, -4.0, 4.0)  # [m]
+SHOWN = 8
+
+FIELD = EuclideanDensity(
+    [UnsafeRegion(Placed(Ball(0.5), c), Placed(Ball(1.0), c)) for c in CENTRES],
+    GOAL,
+    DensityParameters(alpha=0.2, gauge=Gauge.DENSITY, blend_radius=0.1),
+)
+
+
+def random_starts(count: int) -> Array:
+    """Starts outside the sensing regions."""
+    points = np.random.default_rng(6).uniform(-4.0, 4.0, (2 * count + 50, 2))
+    return points[smallest_value([region.s for region in FIELD.unsafe], points) > 0.0][:count]
+
+
+def draw(runs: PointRuns, starts: Array) -> Figure:
+    figure = style.new_figure(10.0, 4.8)
+    plane, traces = figure.subplots(1, 2, width_ratios=[1.0, 1.15])
+    style.plane_axes(plane, EXTENT, "(a) paths under bounded control")
+    style.outline_sensing(plane, [region.s for region in FIELD.unsafe], EXTENT)
+    style.shade_unsafe(plane, FIELD.obstacles, EXTENT)
+    paths = [runs.x[:, i] for i in range(min(SHOWN, len(starts)))]
+    style.draw_curves(plane, paths, style.outcome_colours(runs.outcome[: len(paths)]), width=1.0)
+    plane.plot(*starts[: len(paths)].T, ".", color=style.BLACK, markersize=4, label="starts")
+    style.mark_goal(plane, GOAL)
+    plane.legend(loc="upper left")
+    shown = int(np.argmax([np.abs(np.diff(path, axis=0)).sum() for path in paths]))
+    plane.plot(*paths[shown].T, color=style.VERMILION, linewidth=2.0, zorder=4)
+    moving = np.flatnonzero(np.abs(runs.u[:, shown]).max(axis=1) > 0.0)
+    time, u = runs.time[moving], runs.u[moving, shown]
+    wanted = GAIN * FIELD.direction(runs.x[moving, shown])
+    for axis, colour in enumerate((style.BLUE, style.ORANGE)):
+        traces.plot(time, wanted[:, axis], ":", color=colour, linewidth=1.2)
+        traces.plot(time, u[:, axis], color=colour, label=f"$u_{axis + 1}$")
+    traces.axhline(U_MAX, color=style.BLACK, linestyle="--", label="$\\pm u_{max}$")
+    traces.axhline(-U_MAX, color=style.BLACK, linestyle="--")
+    traces.plot([], [], ":", color=style.BLACK, label="before the bound")
+    traces.set_ylim(-2.0 * U_MAX, 2.0 * U_MAX)
+    traces.set_xlabel("time [s]")
+    traces.set_ylabel("control [m/s]")
+    traces.set_title("(b) control along the red path", fontsize=9.5)
+    traces.legend(loc="upper right")
+    traces.grid(alpha=0.3)
+    return figure
+
+
+def main(arguments: list[str] | None = None) -> None:
+    options = figure_arguments(__doc__, starts=1000, arguments=arguments)
+    starts = random_starts(options.starts)
+    runs, plain = (
+        run_points(FIELD, SingleIntegrator(DT), starts, U_MAX, TIME_LIMIT, REACH_RADIUS, gain)
+        for gain in (GAIN, 1.0)
+    )
+    style.save_figure(draw(runs, starts), options.out, "fig6_bounded_control")
+    reached = Proportion(runs.count(Outcome.REACHED), len(starts))
+    largest = float(np.abs(runs.u).max())
+    at_bound = np.abs(runs.u).max(axis=-1) > U_MAX * (1.0 - 1e-9)
+    FigureReport(
+        "Fig. 6",
+        f"Bounded to u_max = {U_MAX} m/s the control {GAIN:g} ∇ρ stays within the bound, and every start "
+        "outside the sensing regions reaches the goal without entering the unsafe set.",
+        reached.count == reached.total and largest <= U_MAX * (1.0 + 1e-12),
+        {
+            "starts": reached.total,
+            "reached": reached.count,
+            "reached_rate_95": reached.interval,
+            "collided": runs.count(Outcome.COLLIDED),
+            "timed_out": runs.count(Outcome.TIMED_OUT),
+            "u_max_m_per_s": U_MAX,
+            "largest_control_m_per_s": largest,
+            "share_of_runs_that_meet_the_bound": float(at_bound.any(axis=0).mean()),
+            "longest_time_s": float(runs.time[-1]),
+            "gain": GAIN,
+            "gain_1_reached_within_the_time": plain.count(Outcome.REACHED),
+            "gain_1_still_under_way": plain.count(Outcome.TIMED_OUT),
+            "gain_1_collided": plain.count(Outcome.COLLIDED),
+            "smallest_h_m2": float(smallest_value(FIELD.obstacles, runs.x).min()),
+        },
+    ).write(options.out)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,335 @@
+"""Fig. 8: a two-link arm swings up between obstacles that coal maps to joint space, unplanned."""
+
+from dataclasses import dataclass
+from functools import cache, partial
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.patches import Circle
+
+import densarm
+from densarm.arrays import Array
+from densarm.control.density_tracking import DensityTracking
+from densarm.control.gains import Gains
+from densarm.density import (
+    ClearanceSet,
+    DensityParameters,
+    GoalDistance,
+    NavigationDensity,
+    ProductDistance,
+    TorusDistance,
+)
+from densarm.density.joint_space_cover import JointSpaceCover, SensingRegion
+from densarm.density.unsafe_set import UnsafeSet
+from densarm.fields.integral_curves import CurveParameters, IntegralCurves, integral_curves
+from densarm.fields.joint_space_field import JointSpaceField, SmallestClearance
+from densarm.outcome import Outcome
+from densarm.reference.smooth_path import smooth_path
+from densarm.reference.timing import time_path
+from densarm.reference.timing_parameters import TimingParameters
+from densarm.simulation import FixedStepLoop, LoopEnd, Recording, SimulationParameters
+from densarm.simulation.proportion import Proportion
+from densarm.swept_bound import SweptBound
+from densarm.visualization import figure_style as style
+from densarm.visualization.figure_report import FigureReport, figure_arguments
+
+START = (0.01, 0.01)  # [rad]; at (0, 0) itself every density here has a critical point
+GAINS = Gains(position=1.0, velocity=10.0)  # the paper's
+BY_TORQUE = 20  # of the random starts are also run by torque
+COMPARED = 200  # at most so many starts under each of the other densities
+SIGMA = 0.1  # sensing distance where clearance alone makes the bump [m]
+CURVES = CurveParameters(tolerance=1e-3, longest_curve=30.0)  # [rad]
+SNAPSHOTS = 9
+
+scenario = densarm.load_scenario("swing_up")
+arm = scenario.arm
+goal = arm.postures["upright"]
+clearance = densarm.Clearance(arm, scenario.scene)
+bound = SweptBound(clearance)
+
+
+def inertia_weights() -> Array:
+    """Weights of V in proportion to the joints' inertia at the goal."""
+    inertia = arm.mass_matrix(goal).diagonal()
+    return np.asarray(inertia / inertia.max())
+
+
+def sum_distance(weights: Array) -> TorusDistance:
+    return TorusDistance(arm, goal, weights, kappa=np.inf)
+
+
+@dataclass(frozen=True)
+class Basin:
+    """Which starts the planning system brings to the goal."""
+
+    starts: Array
+    """Joint positions (N, 2) [rad]."""
+    curves: IntegralCurves
+
+    @property
+    def reached(self) -> Array:
+        """Whether each curve ended at the goal or at an image of it, a turn away (N,)."""
+        error = arm.difference(arm.configurations(self.curves.end), goal)
+        return np.asarray(np.linalg.norm(error, axis=1) <= 1.1 * CURVES.reach_radius)
+
+    @property
+    def summary(self) -> dict[str, object]:
+        share = Proportion(int(self.reached.sum()), len(self.starts))
+        return {
+            "starts": share.total,
+            "reached": share.count,
+            "reached_rate_95": share.interval,
+            "touched_an_obstacle": self.curves.count(Outcome.COLLIDED),
+            "smallest_clearance_m": float(self.curves.smallest_h.min()),
+        }
+
+
+def basin(distance: GoalDistance, unsafe: UnsafeSet, starts: Array, record: bool = False) -> Basin:
+    density = NavigationDensity([unsafe], distance)
+    field = JointSpaceField(arm, density, clearance)
+    return Basin(starts, integral_curves(field, starts, CURVES, record))
+
+
+def random_starts(count: int) -> Array:
+    """Uniform among the joint positions that touch nothing, within half a turn of the goal."""
+    error = np.random.default_rng(8).uniform(-np.pi, np.pi, (2 * count + 50, 2))
+    points = arm.angles(goal) + error
+    return points[SmallestClearance(clearance)(points) > 0.0][:count]
+
+
+def run_by_torque(unsafe: UnsafeSet, path: Array) -> Recording:
+    """Track the timed planning system's curve, joint positions (M, 2), by [ZNV] eq. 17."""
+    configurations = arm.configurations(path)
+    length = float(np.linalg.norm(np.diff(path, axis=0), axis=1).sum())
+    simulation = SimulationParameters()
+    smooth = smooth_path(bound, configurations)
+    assert smooth is not None
+    reference = time_path(arm, smooth, length, simulation.control_period, TimingParameters())
+    density = NavigationDensity([unsafe], sum_distance(inertia_weights()), DensityParameters())
+    controller = DensityTracking(arm, density, reference, GAINS)
+    return FixedStepLoop(arm, simulation).run(
+        controller, configurations[0], goal, not_before=reference.duration
+    )
+
+
+def smallest_clearance(run: Recording) -> float:
+    return min(float(clearance.distances(q).min()) for q in run.q)
+
+
+def draw_motion(ax: Axes, run: Recording) -> None:
+    ends = [np.zeros((len(run.q), 2))]
+    for angle in np.cumsum(arm.angles(run.q), axis=1).T:
+        ends.append(ends[-1] + np.column_stack([np.sin(angle), -np.cos(angle)]))
+    links = np.stack(ends, axis=1)
+    ax.plot(*links[:, -1].T, color=style.GREY, linewidth=0.8, linestyle=":", label="tip")
+    travel = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(links[:, -1], axis=0), axis=1)))
+    at = np.searchsorted(travel, np.linspace(0.0, 0.999 * travel[-1], SNAPSHOTS))
+    for order, k in enumerate(at):
+        shade = 0.15 + 0.85 * order / (SNAPSHOTS - 1)
+        ax.plot(*links[k].T, color=style.VERMILION, alpha=shade, linewidth=3.0, marker="o", ms=4.0)
+        beside = links[k, -1] + 0.2 * (links[k, -1] - links[k, 1])
+        ax.text(*beside, f"{run.time[k]:.1f} s", fontsize=7, ha="center", va="center")
+    for ball in scenario.scene:
+        ax.add_patch(Circle((ball.position[0], ball.position[2]), ball.radius, color=style.GREY))
+    style.plane_axes(ax, (-2.4, 2.4, -2.4, 2.4), "(a) the swing-up, by torque")
+    ax.set_xlabel("$x$ [m]")
+    ax.set_ylabel("$z$ [m]")
+    ax.plot(0.0, 2.0, "*", color=style.GREEN, markersize=12, markeredgecolor=style.BLACK)
+
+
+def draw_traces(axes: list[Axes], run: Recording) -> None:
+    colours = (style.BLUE, style.VERMILION)
+    rows = (
+        (np.unwrap(arm.angles(run.q), axis=0), np.array([np.inf, np.inf]), "$q$ [rad]"),
+        (run.v, arm.limits.velocity, "$\\dot q$ [rad/s]"),
+        (run.tau, arm.limits.effort, "$u$ [N·m]"),
+    )
+    for ax, (values, limit, label) in zip(axes, rows, strict=True):
+        for j, colour in enumerate(colours):
+            ax.plot(run.time, values[:, j], color=colour, label=f"joint {j + 1}")
+            for side in (-limit[j], limit[j]):
+                if np.isfinite(side):
+                    ax.axhline(side, color=colour, linestyle="--", linewidth=0.7)
+        ax.set_ylabel(label)
+        ax.margins(x=0.0)
+        ax.grid(alpha=0.3)
+    axes[0].set_title("(b) joint positions and velocities (dashed: limits)", fontsize=9.5)
+    axes[0].legend(loc="upper left")
+    axes[2].set_title("(c) torques (dashed: limits)", fontsize=9.5)
+    axes[2].set_xlabel("time [s]")
+
+
+@cache
+def clearance_map(extent: tuple[float, ...]) -> tuple[Array, Array, Array]:
+    first, second = style.plane_grid(extent, 240)
+    return first, second, SmallestClearance(clearance)(np.stack([first, second], axis=-1))
+
+
+def rim(region: SensingRegion, count: int) -> Array:
+    """Points (count, 2) around the rim of a sensing region, in joint positions."""
+    turn = np.linspace(0.0, 2.0 * np.pi, count, endpoint=False)
+    squares, directions = np.linalg.eigh(region.ellipsoid.shape)
+    circle = np.column_stack([np.cos(turn), np.sin(turn)])
+    return np.asarray(region.ellipsoid.centre + circle * np.sqrt(squares) @ directions.T)
+
+
+def traps_on_rim(cover: JointSpaceCover, distance: GoalDistance) -> int:
+    """Count rim points at which V presses inwards and is smallest along the rim.
+
+    A rim without such points is curved enough for the level sets of V: what V presses against it
+    slides off. Where there is one, a spurious maximum of the density waits inside.
+    """
+    count, slope = 0, np.zeros(arm.nv)
+    for region in cover.regions:
+        points = rim(region, 2000)
+        configurations = arm.configurations(points)
+        value = np.array([distance.evaluate(q, slope) for q in configurations])
+        smallest = (value < np.roll(value, 1)) & (value < np.roll(value, -1))
+        for k in np.flatnonzero(smallest):
+            distance.evaluate(configurations[k], slope)
+            outwards = np.linalg.solve(region.ellipsoid.shape, points[k] - region.ellipsoid.centre)
+            count += int(slope @ outwards > 0.0)
+    return count
+
+
+def draw_joint_space(ax: Axes, cover: JointSpaceCover, title: str, beyond: float = 0.0) -> None:
+    """The unsafe set and the sensing regions, from π + beyond left of hanging to as much right."""
+    extent = (-np.pi - beyond, np.pi + beyond, -np.pi, np.pi)
+    first, second, h = clearance_map(extent)
+    ax.contourf(first, second, h, levels=[-np.inf, 0.0], colors=[style.GREY], zorder=2)
+    ax.contour(first, second, h, levels=[0.0], colors=[style.BLACK], linewidths=0.8, zorder=2)
+    for region in cover.regions:
+        x, y = rim(region, 200).T
+        for image in (-2.0 * np.pi, 0.0, 2.0 * np.pi):
+            ax.plot(x + image, y, color=style.BLACK, linewidth=0.8, linestyle="--", zorder=2)
+    style.plane_axes(ax, extent, title)
+    ax.set_xlabel("$q_1$ [rad]")
+    ax.set_ylabel("$q_2$ [rad]")
+    for image in (-np.pi, np.pi):
+        style.mark_goal(ax, np.array([image, 0.0]))
+
+
+def draw_density(ax: Axes, cover: JointSpaceCover, path: Array) -> None:
+    draw_joint_space(ax, cover, "(d) unsafe set by coal, sensing regions (dashed), ln ρ", 0.5)
+    density = NavigationDensity([cover], sum_distance(inertia_weights()))
+    field = JointSpaceField(arm, density, clearance)
+    first, second = style.plane_grid((-np.pi - 0.5, np.pi + 0.5, -np.pi, np.pi), 150)
+    value = field.height(np.stack([first, second], axis=-1))
+    levels = np.arange(-3.0, 3.0, 0.15)
+    ax.contour(first, second, value, levels, colors=style.SKY, linewidths=0.6, linestyles="-")
+    ax.plot(*path.T, color=style.VERMILION, linewidth=1.8, zorder=5, label="planning system")
+    ax.plot(*path[0], "o", color=style.VERMILION, markersize=5, zorder=6, label="start")
+    ax.legend(*_first_labels(ax), loc="lower left", framealpha=0.95, fontsize=7)
+
+
+def draw_basin(ax: Axes, cover: JointSpaceCover, shown: Basin, title: str) -> None:
+    draw_joint_space(ax, cover, title)
+    starts = (shown.starts + np.pi) % (2.0 * np.pi) - np.pi
+    for reached, colour, name in ((True, style.BLUE, "reached"), (False, style.ORANGE, "stuck")):
+        chosen = starts[shown.reached == reached]
+        if len(chosen):
+            ax.plot(*chosen.T, ".", color=colour, markersize=3, zorder=3, label=name)
+    stuck = shown.curves.end[~shown.reached]
+    if len(stuck):
+        stuck = (stuck + np.pi) % (2.0 * np.pi) - np.pi
+        ax.plot(*stuck.T, "x", color=style.VERMILION, markersize=5, zorder=7, label="stuck here")
+    ax.legend(*_first_labels(ax), loc="upper right", framealpha=0.95, fontsize=7)
+
+
+def _first_labels(ax: Axes) -> tuple[list[object], list[str]]:
+    """One entry of each name."""
+    entries = dict(zip(*reversed(ax.get_legend_handles_labels()), strict=True))
+    return list(entries.values()), list(entries)
+
+
+def draw_runs(ax: Axes, runs: list[Recording]) -> None:
+    for run in runs:
+        angles = arm.angles(run.q)
+        breaks = np.abs(np.diff(angles, axis=0)).max(axis=1) > np.pi
+        angles[1:][breaks] = np.nan
+        ax.plot(*angles.T, color=style.BLACK, linewidth=0.8, zorder=4, label="by torque")
+        ax.plot(*angles[0], "s", color=style.BLACK, markersize=3, zorder=5)
+
+
+def draw(
+    cover: JointSpaceCover, path: Array, run: Recording, runs: list[Recording], maps: list[Basin]
+) -> Figure:
+    figure = style.new_figure(13.5, 9.0)
+    axes = figure.subplot_mosaic([["a", [["b"], ["v"], ["c"]], "d"], ["e", "f", "g"]])
+    draw_motion(axes["a"], run)
+    draw_traces([axes["b"], axes["v"], axes["c"]], run)
+    draw_density(axes["d"], cover, path)
+    draw_runs(axes["e"], runs)
+    names = ("V: sum, inertia weights", "V: sum, equal weights", "V: the paper's product")
+    for name, key, shown in zip(names, "efg", maps, strict=True):
+        share = Proportion(int(shown.reached.sum()), len(shown.starts))
+        draw_basin(axes[key], cover, shown, f"({key}) {name}:\n{share} reach")
+    return figure
+
+
+def main(arguments: list[str] | None = None) -> None:
+    options = figure_arguments(__doc__, starts=1000, arguments=arguments)
+    cover = JointSpaceCover(bound)
+    starts = random_starts(options.starts)
+    weighted, equal = sum_distance(inertia_weights()), sum_distance(np.ones(arm.nv))
+    swing = basin(weighted, cover, np.array([START]), record=True)
+    shown = basin(weighted, cover, starts)
+    traced = basin(weighted, cover, starts[:BY_TORQUE], record=True)
+    run = run_by_torque(cover, swing.curves.paths[0])
+    runs = [
+        run_by_torque(cover, path)
+        for path, reached in zip(traced.curves.paths, traced.reached, strict=True)
+        if reached
+    ]
+    few = partial(basin, starts=np.vstack([[START], starts[:COMPARED]]))
+    others = [few(equal, cover), few(ProductDistance(arm, goal), cover)]
+    figure = draw(cover, swing.curves.paths[0], run, runs, [shown, *others])
+    style.save_figure(figure, options.out, "fig8_swing_up")
+    clear = [min(smallest_clearance(each), 1.0) for each in (run, *runs)]
+    held = [each.end is LoopEnd.REACHED for each in (run, *runs)]
+    ratio = max(float((np.abs(each.tau) / arm.limits.effort).max()) for each in (run, *runs))
+    bump = ClearanceSet(clearance, 0.0, SIGMA)
+    FigureReport(
+        "Fig. 8",
+        "With obstacles mapped to joint space by coal and sensed in convex regions the density "
+        "alone, without a planner, swings the arm up from (0.01, 0.01) by K_p = 1, K_v = 10 "
+        "without contact, and its planning system reaches the goal from 99 % of all free starts.",
+        bool(
+            swing.reached.all()
+            and np.mean(shown.reached) >= 0.99
+            and shown.curves.count(Outcome.COLLIDED) == 0
+            and len(runs) == len(traced.starts)
+            and all(held)
+            and min(clear) > 0.0
+        ),
+        {
+            "planning_system": shown.summary,
+            "starts_inside_sensing_regions": sum(
+                bool((cover.sensing_functions(q) < 0.0).any()) for q in arm.configurations(starts)
+            ),
+            "stuck_starts_rad": starts[~shown.reached].tolist(),
+            "swing_up_reached_by_planning_system": bool(swing.reached.all()),
+            "swing_up_reached_by_torque": held[0],
+            "swing_up_duration_s": float(run.time[-1]),
+            "swing_up_smallest_clearance_m": clear[0],
+            "runs_by_torque": len(traced.starts),
+            "runs_by_torque_reached": sum(held[1:]),
+            "runs_by_torque_smallest_clearance_m": min(clear[1:]),
+            "peak_torque_ratio": ratio,
+            "weights_of_V": inertia_weights().tolist(),
+            "traps_on_rims_inertia_weights": traps_on_rim(cover, weighted),
+            "traps_on_rims_equal_weights": traps_on_rim(cover, equal),
+            "sensing_semi_axes_rad": [r.ellipsoid.semi_axes.tolist() for r in cover.regions],
+            "other_densities": {
+                "cover, sum with equal weights": others[0].summary,
+                "cover, the paper's product": others[1].summary,
+                f"clearance sensed within {SIGMA} m, inertia weights": few(weighted, bump).summary,
+                f"clearance sensed within {SIGMA} m, equal weights": few(equal, bump).summary,
+            },
+        },
+    ).write(options.out)
+
+
+if __name__ == "__main__":
+    main()

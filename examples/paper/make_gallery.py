@@ -1,0 +1,47 @@
+"""Run every script of this folder and write docs/gallery.md with the pictures and verdicts."""
+
+import argparse
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+FOLDER = Path(__file__).resolve().parent
+DOCS = FOLDER.parents[1] / "docs"
+
+
+def section(script: Path, pictures: Path) -> str:
+    """Text on one figure whose script has run."""
+    result = json.loads((pictures / "result.json").read_text(encoding="utf-8"))
+    verdict = "The claim holds." if result["holds"] else "The claim does not hold."
+    images = "\n".join(
+        f"![{result['figure']}]({picture.relative_to(DOCS).as_posix()})"
+        for picture in sorted(pictures.glob("*.png"))
+    )
+    numbers = (pictures / "result.json").relative_to(DOCS).as_posix()
+    return (
+        f"## {result['figure']}\n\n{images}\n\n{result['claim']} **{verdict}**\n"
+        f"Numbers: [result.json]({numbers}). Script: `examples/paper/{script.name}`.\n"
+    )
+
+
+def main(arguments: list[str] | None = None) -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--keep", action="store_true", help="do not run scripts that have run")
+    options = parser.parse_args(arguments)
+    sections = []
+    for script in sorted(FOLDER.glob("fig*.py")):
+        pictures = DOCS / "gallery" / script.stem
+        if not (options.keep and (pictures / "result.json").exists()):
+            subprocess.run([sys.executable, script, "--out", pictures], check=True)
+        sections.append(section(script, pictures))
+    introduction = (
+        "# Gallery\n\nThe figures of A. Zheng, S. S. K. S. Narayanan, U. Vaidya, *Safe Navigation "
+        "Using Density Functions*, IEEE RA-L 2023, each with its claim and whether it held.\n"
+        "`python examples/paper/make_gallery.py` makes this page.\n\n"
+    )
+    (DOCS / "gallery.md").write_text(introduction + "\n".join(sections), encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()

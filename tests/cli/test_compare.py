@@ -1,0 +1,54 @@
+import json
+
+import pytest
+
+from densarm.study.methods import METHODS
+
+
+def test_table_plot_and_json(command, scenario_file, tmp_path):
+    path, plot = tmp_path / "compare.json", tmp_path / "compare.png"
+    options = ["--starts", 2, "--seed", 4, "--json", path, "--plot", plot]
+    done = command("compare", scenario_file(), "--methods", "potential_field,cbf_qp", *options)
+    assert done.status == 0
+    assert done.err == ""
+    data = json.loads(path.read_text(encoding="utf-8"))
+    assert list(data) == ["methods", "starts", "scenario", "seed"]
+    assert [entry["method"] for entry in data["methods"]] == ["potential_field", "cbf_qp"]
+    assert all(entry["reached"] >= 1 for entry in data["methods"])
+    assert plot.read_bytes().startswith(b"\x89PNG")
+    assert "2 starts, seed 4" in done.out
+    for entry in data["methods"]:
+        row = next(line for line in done.out.splitlines() if entry["method"] in line)
+        assert row.split()[1] == str(entry["reached"])
+        assert row.split()[6] == f"{entry['time_s']:.2f}"
+        assert row.split()[-1] == f"{entry['step_us']:.0f}"
+
+
+def test_status_is_zero_whatever_was_reached(command):
+    done = command("compare", "swing_up", "--methods", "potential_field", "--starts", 1)
+    assert done.status == 0
+    row = next(line for line in done.out.splitlines() if "potential_field" in line)
+    assert row.split()[1:6] == ["0", "0", "1", "0", "0"]
+
+
+@pytest.mark.parametrize(
+    ("options", "expected"),
+    [
+        (["--methods", "density,rrt"], ["'rrt'", "cbf_qp", "plan_then_track"]),
+        (["--methods", ""], ["unknown method ''"]),
+        (["--starts", "0"], ["--starts"]),
+        (["--seed", "-1"], ["--seed"]),
+        (["--plot", "compare.gif"], ["--plot", ".png"]),
+    ],
+)
+def test_wrong_input_is_one_line(command, options, expected):
+    done = command("compare", "swing_up", *options)
+    assert done.status == 2
+    assert done.out == ""
+    assert done.err.count("\n") == 1
+    assert all(part in done.err for part in expected), done.err
+
+
+def test_help_names_every_method(command):
+    words = command("compare", "--help").out.replace(",", " ").split()
+    assert set(METHODS) <= set(words)
