@@ -3,8 +3,6 @@
 from collections.abc import Iterable
 from difflib import get_close_matches
 
-import numpy as np
-
 
 class DensarmError(ValueError):
     """Base of every error that densarm raises about its input; its message is one line."""
@@ -58,6 +56,6 @@ class FileContentError(DensarmError):
 
 
 def _short(value: object) -> str:
-    plain = value.item() if isinstance(value, np.generic) else value
+    plain = value.tolist() if hasattr(value, "tolist") else value  # numpy's own
     text = " ".join(repr(plain).split())
     return text if len(text) <= 80 else text[:77] + "..."

@@ -21,7 +21,7 @@ class Outcome(StrEnum):
 
 _DESCRIPTIONS = {
     Outcome.REACHED: "The arm reached the goal, held it and touched nothing.",
-    Outcome.STUCK: "The arm came to rest away from the goal, where the density has no slope.",
+    Outcome.STUCK: "The arm came to rest away from the goal, where what drives it leads nowhere.",
     Outcome.COLLIDED: "The arm touched an obstacle or itself.",
     Outcome.TIMED_OUT: "The time limit ended the run before the goal was reached and held.",
     Outcome.INFEASIBLE: "Start or goal is in contact or outside limits, or torque is too weak.",

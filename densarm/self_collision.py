@@ -104,7 +104,9 @@ def _always_colliding(model: pin.Model, geometry: pin.GeometryModel) -> list[tup
         for k in np.flatnonzero(colliding):
             colliding[k] = pin.computeCollision(geometry, geometry_data, int(k))
     # Pinocchio's own pairs are references into a vector that shifts when one is removed.
-    return [(pair.first, pair.second) for pair, always in zip(pairs, colliding, strict=True) if always]
+    return [
+        (pair.first, pair.second) for pair, always in zip(pairs, colliding, strict=True) if always
+    ]
 
 
 def _random_configuration(model: pin.Model, random: np.random.Generator) -> Array:

@@ -66,6 +66,7 @@ def test_panda():
     np.testing.assert_array_equal(arm.limits.acceleration, [15, 7.5, 10, 12.5, 15, 20, 20])
     assert {"ready", "stretched"} <= set(arm.postures)
     assert {"link0.stl", "hand.stl"} <= set(arm.mesh_hashes())
+    assert {item.meshPath[-4:] for item in arm.visual_model.geometryObjects} == {".dae"}
 
 
 def test_panda_as_capsules():

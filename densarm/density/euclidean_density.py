@@ -20,6 +20,8 @@ from densarm.density.navigation_density import (
 from densarm.density.smooth_step import smooth_step
 from densarm.validation import finite_vector
 
+_DEFAULTS = DensityParameters()
+
 
 class EuclideanDensity:
     r"""The density of where a point of Rⁿ may spend its time.
@@ -43,7 +45,7 @@ class EuclideanDensity:
         self,
         unsafe: Sequence[UnsafeRegion],
         goal: ArrayLike,
-        parameters: DensityParameters = DensityParameters(),
+        parameters: DensityParameters = _DEFAULTS,
     ) -> None:
         self.unsafe = tuple(unsafe)
         self.goal = finite_vector("goal", goal, np.size(goal))
@@ -61,7 +63,7 @@ class EuclideanDensity:
     def log_value(self, x: Array) -> Array:
         """Return ln ρ at points `x` (..., n): (...), −inf in contact for θ = 0."""
         distance = np.maximum(np.sum((x - self.goal) ** 2, axis=-1), V_MIN)
-        return self.log_psi(x) - self.parameters.alpha * np.log(distance)
+        return self.log_psi(x) - self.parameters.alpha * np.log(distance)  # type: ignore[no-any-return]
 
     def height(self, x: Array) -> Array:
         """Return ln ρ, which `direction` climbs, as `log_value` has it."""
@@ -136,7 +138,7 @@ def _add_log_bumps(
         width = abs(h[member] - s[member]) if h[member] <= 0.0 else h[member] - s[member]
         value, slope = log_inverse_bump(h[member], width, theta)
         total[row] += value - math.log1p(theta)
-        t = h[member] / width
+        t = max(h[member] / width, 0.0)
         for i in range(gradient.shape[1]):
             change = h_gradient[member, i] - s_gradient[member, i]
             gradient[row, i] += slope * (h_gradient[member, i] - t * change)

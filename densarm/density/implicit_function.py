@@ -109,7 +109,7 @@ class Product:
 
     def __call__(self, x: Array) -> Array:
         """Act as `ImplicitFunction.__call__`."""
-        return np.prod(self._values(x), axis=-1)
+        return np.prod(self._values(x), axis=-1)  # type: ignore[no-any-return]
 
     def gradient(self, x: Array) -> Array:
         """Act as `ImplicitFunction.gradient`."""
@@ -117,7 +117,7 @@ class Product:
         count = len(self.functions)
         others = np.where(np.eye(count, dtype=bool), 1.0, values[..., np.newaxis, :]).prod(axis=-1)
         gradients = np.stack([function.gradient(x) for function in self.functions], axis=-2)
-        return np.einsum("...k,...ki->...i", others, gradients)
+        return np.einsum("...k,...ki->...i", others, gradients)  # type: ignore[no-any-return]
 
     def _values(self, x: Array) -> Array:
         return np.stack([function(x) for function in self.functions], axis=-1)

@@ -26,7 +26,7 @@ class Ball:
 
     def __call__(self, x: Array) -> Array:
         """Act as `ImplicitFunction.__call__`."""
-        return np.sum(x * x, axis=-1) - self.radius**2
+        return np.sum(x * x, axis=-1) - self.radius**2  # type: ignore[no-any-return]
 
     def gradient(self, x: Array) -> Array:
         """Act as `ImplicitFunction.gradient`."""
@@ -48,7 +48,7 @@ class Ellipsoid:
 
     def __call__(self, x: Array) -> Array:
         """Act as `ImplicitFunction.__call__`."""
-        return np.sum((self.scaling * x) ** 2, axis=-1) - self.radius**2
+        return np.sum((np.array(self.scaling) * x) ** 2, axis=-1) - self.radius**2  # type: ignore[no-any-return]
 
     def gradient(self, x: Array) -> Array:
         """Act as `ImplicitFunction.gradient`."""
@@ -71,7 +71,7 @@ class PNormBall:
 
     def __call__(self, x: Array) -> Array:
         """Act as `ImplicitFunction.__call__`."""
-        return np.sum(np.abs(x) ** self.p, axis=-1) - self.radius**self.p
+        return np.sum(np.abs(x) ** self.p, axis=-1) - self.radius**self.p  # type: ignore[no-any-return]
 
     def gradient(self, x: Array) -> Array:
         """Act as `ImplicitFunction.gradient`."""
@@ -101,7 +101,7 @@ class Oval:
         """Act as `ImplicitFunction.gradient`."""
         left, right = self._squares(x)
         offset = np.array([self.focus, 0.0])
-        return 2.0 * (right[..., None] * (x - offset) + left[..., None] * (x + offset))
+        return 2.0 * (right[..., None] * (x - offset) + left[..., None] * (x + offset))  # type: ignore[no-any-return]
 
     def _squares(self, x: Array) -> tuple[Array, Array]:
         offset = np.array([self.focus, 0.0])
@@ -160,7 +160,7 @@ class Egg:
         return np.stack([along, across], axis=-1)
 
     def _width_term(self, x: Array) -> Array:
-        return (self.b * x[..., 1]) ** 2 * self.c ** x[..., 0]  # type: ignore[no-any-return]
+        return (self.b * x[..., 1]) ** 2 * self.c ** x[..., 0]
 
 
 @dataclass(frozen=True)
@@ -188,7 +188,7 @@ class CShape:
 
     def __call__(self, x: Array) -> Array:
         """Act as `ImplicitFunction.__call__`."""
-        return self._across(x) ** 2 + np.logaddexp(0.0, self._beyond(x)) ** 2 - 1.0
+        return self._across(x) ** 2 + np.logaddexp(0.0, self._beyond(x)) ** 2 - 1.0  # type: ignore[no-any-return]
 
     def gradient(self, x: Array) -> Array:
         """Act as `ImplicitFunction.gradient`."""
@@ -203,7 +203,7 @@ class CShape:
         return (np.sum(x * x, axis=-1) - self.radius**2) / scale  # type: ignore[no-any-return]
 
     def _beyond(self, x: Array) -> Array:
-        return self.sharpness * (x[..., 0] - self.opening)  # type: ignore[no-any-return]
+        return self.sharpness * (x[..., 0] - self.opening)
 
 
 @dataclass(frozen=True)
@@ -224,7 +224,7 @@ class Torus:
     def __call__(self, x: Array) -> Array:
         """Act as `ImplicitFunction.__call__`."""
         in_plane = np.sum(x[..., :2] ** 2, axis=-1)
-        return self._sum(x) ** 2 - 4.0 * self.major_radius**2 * in_plane
+        return self._sum(x) ** 2 - 4.0 * self.major_radius**2 * in_plane  # type: ignore[no-any-return]
 
     def gradient(self, x: Array) -> Array:
         """Act as `ImplicitFunction.gradient`."""
@@ -249,7 +249,7 @@ class Cylinder:
 
     def __call__(self, x: Array) -> Array:
         """Act as `ImplicitFunction.__call__`."""
-        return np.sum(x[..., :-1] ** 2, axis=-1) - self.radius**2
+        return np.sum(x[..., :-1] ** 2, axis=-1) - self.radius**2  # type: ignore[no-any-return]
 
     def gradient(self, x: Array) -> Array:
         """Act as `ImplicitFunction.gradient`."""
@@ -272,7 +272,7 @@ class HalfSpace:
 
     def __call__(self, x: Array) -> Array:
         """Act as `ImplicitFunction.__call__`."""
-        return x @ np.array(self.normal)
+        return x @ np.array(self.normal)  # type: ignore[no-any-return]
 
     def gradient(self, x: Array) -> Array:
         """Act as `ImplicitFunction.gradient`."""

@@ -31,8 +31,8 @@ class CoverParameters:
     """By how much the semi-axes of a sensing region exceed those of the ellipsoid around its part
     of the unsafe set [rad or m]: the more, the rounder."""
     sensing_distance: float = 0.2
-    """σ [m]: clearances far below it follow the sensing region's shape less and the unsafe
-    set's more."""
+    """σ [m]: the larger against the clearance on the rim, the later the bump falls off, and the
+    more its level sets take the shape of the rim instead of the unsafe set's."""
 
     def __post_init__(self) -> None:
         positive_integer("depth", self.depth)
@@ -60,8 +60,10 @@ class JointSpaceCover:
 
     with an inverse bump for every component c and pair k that may touch in it. h is the true
     clearance, so that the density vanishes in contact and nowhere else; s is free [ZNV eq. 3] and
-    gives the rim, which is what trajectories meet, a convex and curved shape. Clearance itself
-    is neither: where σ alone bounds the sensing region, trajectories get stuck.
+    gives the rim, along which trajectories slide, a convex and curved shape. Whether it is curved
+    enough depends on V too: on no rim may V be smallest, along the rim, where it presses inwards.
+    With weights of V in proportion to the joints' inertia that holds for the swing-up of
+    [ZNV] Fig. 8, with equal weights it does not.
 
     An `UnsafeSet` for arms with up to three joints. Components are found by `unsafe_components`;
     every unsafe configuration is proved to lie inside the sensing region of its component.
@@ -98,9 +100,8 @@ class JointSpaceCover:
         self._centre = arm.configurations(np.reshape([e.centre for e in ellipsoids], shape))
         inverses = [np.linalg.inv(e.shape) for e in ellipsoids]
         self._inverse = np.reshape(inverses, (*shape, arm.nv))
-        counts = [len(region.pairs) for region in self.regions]
-        self._member_region = np.repeat(np.arange(shape[0]), counts)
-        self._member_pair = np.array([k for r in self.regions for k in r.pairs], dtype=np.int64)
+        members = [(c, k) for c, region in enumerate(self.regions) for k in region.pairs]
+        self._member_region, self._member_pair = np.array(members, np.int64).reshape(-1, 2).T
         self._idx_q, self._is_circle = arm.idx_q, arm.is_circle
         self._s, self._s_gradient = np.zeros(shape[0]), np.zeros(shape)
 

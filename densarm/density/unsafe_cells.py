@@ -70,7 +70,7 @@ def unsafe_components(bound: SweptBound, depth: int = 8) -> tuple[UnsafeComponen
         index = (2 * index[:, np.newaxis] + halves).reshape(-1, arm.nv)
         width = span / 2.0**level
         centre = arm.configurations(lower + (index + 0.5) * width)
-        slack = np.array([bound.slack(q) for q in centre]).reshape(len(centre), -1)
+        slack = np.reshape([bound.slack(q) for q in centre], (-1, bound.clearance.n_pairs))
         near = slack <= bound.motion(0.5 * width)
         index, near = index[near.any(axis=1)], near[near.any(axis=1)]
     row_of = {cell: row for row, cell in enumerate(map(tuple, index.tolist()))}

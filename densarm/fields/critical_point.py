@@ -65,7 +65,7 @@ def find_critical_point(
         x = x + move * min(1.0, LONGEST_MOVE / max(length, 1e-300))
         if length < 1e-14:
             break
-    eigenvalues = np.linalg.eigvalsh(log_hessian(density, x, step))
+    eigenvalues: Array = np.linalg.eigvalsh(log_hessian(density, x, step)).astype(np.float64)
     slope = float(np.linalg.norm(density.gradient(x, Gauge.LOG)))
     return CriticalPoint(x, slope, eigenvalues, _kind(eigenvalues))
 
@@ -75,7 +75,7 @@ def log_hessian(density: EuclideanDensity, x: Array, step: float = 1e-5) -> Arra
     axes = step * np.eye(x.size)
     ahead, behind = (density.gradient(x + sign * axes, Gauge.LOG) for sign in (1.0, -1.0))
     hessian = (ahead - behind) / (2.0 * step)
-    return 0.5 * (hessian + hessian.T)  # type: ignore[no-any-return]
+    return 0.5 * (hessian + hessian.T)
 
 
 def _kind(eigenvalues: Array) -> CriticalKind:

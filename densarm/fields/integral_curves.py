@@ -1,7 +1,8 @@
 """Integral curves of a navigation field on Rⁿ, from many starts at once."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -122,22 +123,17 @@ def integral_curves(
     )
 
 
-@dataclass
 class _Front:
     """The points that the curves have come to."""
 
-    field: NavigationField
-    x: Array
-    parameters: CurveParameters
-    active: NDArray[np.intp] = field(init=False)
-
-    def __post_init__(self) -> None:
-        count, p = len(self.x), self.parameters
+    def __init__(self, field: NavigationField, x: Array, parameters: CurveParameters) -> None:
+        self.field, self.x, self.parameters = field, x, parameters
+        count = len(x)
         self.smallest_h = np.full(count, np.inf)
         self.longest = np.empty(count)
         self._look_around(np.arange(count))
         self.length = np.zeros(count)
-        self.step = np.full(count, p.longest_step)
+        self.step = np.full(count, parameters.longest_step)
         self.slope = _unit(self.field.direction(self.x))
         self.height = self.field.height(self.x)
         self.outcome = np.full(count, Outcome.TIMED_OUT, dtype="U10")
@@ -174,7 +170,7 @@ class _Front:
         def solve(right: Array) -> Array:
             k = np.linalg.solve(system, right[..., np.newaxis])[..., 0]
             # The field has length one: a longer k is of a singular system, far off the curve.
-            return k / np.maximum(np.linalg.norm(k, axis=-1, keepdims=True) / _LONGEST_K, 1.0)
+            return k / np.maximum(np.linalg.norm(k, axis=-1, keepdims=True) / _LONGEST_K, 1.0)  # type: ignore[no-any-return]
 
         k1 = solve(f0)
         f1 = self._unit_at(x + 0.5 * size * k1)
@@ -237,5 +233,5 @@ def _assemble(history: list[tuple[NDArray[np.intp], Array]], count: int) -> Iter
     points = np.concatenate([x for _, x in history])
     order = np.argsort(index, kind="stable")
     bounds = np.searchsorted(index[order], np.arange(count + 1))
-    for start, stop in zip(bounds[:-1], bounds[1:], strict=True):
+    for start, stop in pairwise(bounds):
         yield points[order[start:stop]]

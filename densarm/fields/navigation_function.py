@@ -66,7 +66,7 @@ class NavigationFunction:
             # A small positive floor in place of h ≤ 0 points out of contact.
             value = np.maximum(h(x), _CONTACT)[..., np.newaxis]
             log_beta_gradient += h.gradient(x) / value
-        return gamma / self.kappa * log_beta_gradient - 2.0 * error
+        return gamma / self.kappa * log_beta_gradient - 2.0 * error  # type: ignore[no-any-return]
 
 
 _CONTACT = 1e-12

@@ -59,7 +59,7 @@ class PotentialField:
             value = np.maximum(h(x), _CONTACT)
             slope = self.repulsion * self._excess(value) / value**2
             out += slope[..., np.newaxis] * h.gradient(x)
-        return out  # type: ignore[no-any-return]
+        return out
 
     def _excess(self, h: Array) -> Array:
         return np.maximum(1.0 / np.maximum(h, _CONTACT) - 1.0 / self.influence, 0.0)

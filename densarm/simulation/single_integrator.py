@@ -112,7 +112,7 @@ def run_points(
     outcome = np.full(len(x), Outcome.TIMED_OUT, dtype="U10")
     active = np.ones(len(x), dtype=bool)
     positions, controls = [], []
-    for _ in range(int(round(time_limit / plant.dt)) + 1):
+    for _ in range(round(time_limit / plant.dt) + 1):
         positions.append(x)
         reached = np.linalg.norm(x - field.goal, axis=-1) <= reach_radius
         outcome[active & reached] = Outcome.REACHED
@@ -127,5 +127,5 @@ def run_points(
         stepped, v = plant.step(x, v, u)
         x = np.where(active[:, np.newaxis], stepped, x)
     controls[-1] = np.zeros_like(x)
-    time = plant.dt * np.arange(len(positions))
+    time: Array = plant.dt * np.arange(len(positions), dtype=np.float64)
     return PointRuns(time, np.array(positions), np.array(controls), outcome)

@@ -1,4 +1,4 @@
-"""Comparison: every method from every start, under the same limits, distances and seeds."""
+"""Comparison: every method from every start, under the same distances, margins and seeds."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace

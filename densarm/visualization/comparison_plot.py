@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 
 from densarm.atomic_file import atomic_file
 from densarm.errors import InvalidValueError
@@ -72,6 +73,7 @@ def _plot_outcomes(axes: Axes, comparison: Comparison) -> None:
         left += counts
     axes.set_xlim(0, comparison.starts)
     axes.set_xlabel("runs")
+    axes.xaxis.set_major_locator(MaxNLocator(integer=True))
 
 
 def _plot_measure(axes: Axes, comparison: Comparison, measure: str, scale: float) -> None:

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from matplotlib import rc_context
@@ -9,7 +10,6 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import to_rgba
 from matplotlib.figure import Figure
-from mpl_toolkits.mplot3d import Axes3D
 
 from densarm.arrays import Array
 from densarm.atomic_file import atomic_file
@@ -30,7 +30,7 @@ OUTCOME_COLOUR = {
     Outcome.INFEASIBLE: GREY,
 }
 
-_STYLE = {
+_STYLE: dict[Any, Any] = {
     "font.size": 9.0,
     "axes.titlesize": 9.5,
     "axes.labelsize": 9.0,
@@ -73,7 +73,7 @@ def plane_axes(axes: Axes, extent: Sequence[float], title: str) -> None:
     axes.set_ylabel("$x_2$ [m]")
 
 
-def space_axes(axes: Axes3D, extent: Sequence[float], title: str) -> None:
+def space_axes(axes: Any, extent: Sequence[float], title: str) -> None:
     """Set up axes of space, the bounds of x₁, x₂ and x₃ in turn [m], at equal scales."""
     axes.set_xlim(extent[0], extent[1])
     axes.set_ylim(extent[2], extent[3])

@@ -68,7 +68,9 @@ def weighted_starts(count: int) -> tuple[Array, Array]:
     rate = source(inside) * area
     along = -HALF + size * (np.arange(side) + 0.5)
     edges = [np.stack([np.full(side, end), along], 1)[:, order] for end, order in BORDER]
-    inflow = [influx(edge, end, order) * size for edge, (end, order) in zip(edges, BORDER, strict=True)]
+    inflow = [
+        influx(edge, end, order) * size for edge, (end, order) in zip(edges, BORDER, strict=True)
+    ]
     return np.concatenate([inside, *edges]), np.concatenate([rate, *inflow])
 
 
@@ -155,7 +157,9 @@ def draw(measured: Array, rho: Array) -> Figure:
         style.plane_axes(ax, EXTENT, title)
         style.outline_sensing(ax, [region.s for region in FIELD.unsafe], EXTENT)
     along = np.linspace(-4.8, 4.8, 13)
-    starts = np.concatenate([np.stack([np.full(13, -4.9), along], 1), np.stack([along, np.full(13, 4.9)], 1)])
+    starts = np.concatenate(
+        [np.stack([np.full(13, -4.9), along], 1), np.stack([along, np.full(13, 4.9)], 1)]
+    )
     curves = integral_curves(FIELD, starts, record=True)
     style.draw_curves(axes[0], curves.paths, style.outcome_colours(curves.outcome))
     axes[0].plot(*starts.T, ".", color=style.BLACK, markersize=4, label="starts")

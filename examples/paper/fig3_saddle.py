@@ -55,7 +55,9 @@ def draw(field: EuclideanDensity, saddle: CriticalPoint, ray: IntegralCurves) ->
         "(c) starts outside (A) and inside (B) the sensing region",
         "(d) A and B at the rim of the sensing region",
     )
-    for ax, title, extent in zip(axes, titles, [EXTENT] * 3 + [(-3.4, -1.2, -0.4, 1.8)], strict=True):
+    for ax, title, extent in zip(
+        axes, titles, [EXTENT] * 3 + [(-3.4, -1.2, -0.4, 1.8)], strict=True
+    ):
         style.plane_axes(ax, extent, title)
         draw_scene(ax, field, extent)
     along = np.linspace(0.0, 1.0, 40)[:, np.newaxis]

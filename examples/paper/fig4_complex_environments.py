@@ -178,7 +178,9 @@ def field_of(environment: Environment) -> EuclideanDensity:
 def rates(environment: Environment, count: int) -> dict[str, dict[str, float]]:
     """Outcomes from the paper's kind of starts, and from starts all over the free space."""
     random, field = np.random.default_rng(4), field_of(environment)
-    starts = [sample(random, count) for sample in (environment.paper_starts, environment.random_starts)]
+    starts = [
+        sample(random, count) for sample in (environment.paper_starts, environment.random_starts)
+    ]
     curves = integral_curves(field, np.concatenate(starts))
     return {
         "starts_as_in_the_paper": summary(curves, slice(None, count)),

@@ -102,9 +102,7 @@ def draw(numbers: dict[str, dict[str, object]], starts: int) -> Figure:
 
 def main(arguments: list[str] | None = None) -> None:
     options = figure_arguments(__doc__, starts=1000, arguments=arguments)
-    numbers = {
-        name: rates(field, options.starts) for name, field in {**FIELDS, **BEYOND}.items()
-    }
+    numbers = {name: rates(field, options.starts) for name, field in {**FIELDS, **BEYOND}.items()}
     style.save_figure(draw(numbers, options.starts), options.out, "fig5_c_shape")
     reached = {name: numbers[name]["reached"] for name in FIELDS}
     enclosing = reached.pop("density, r = 4.5")

@@ -80,8 +80,8 @@ def main(arguments: list[str] | None = None) -> None:
     at_bound = np.abs(runs.u).max(axis=-1) > U_MAX * (1.0 - 1e-9)
     FigureReport(
         "Fig. 6",
-        f"Bounded to u_max = {U_MAX} m/s the control {GAIN:g} ∇ρ stays within the bound, and every start "
-        "outside the sensing regions reaches the goal without entering the unsafe set.",
+        f"Bounded to u_max = {U_MAX} m/s the control {GAIN:g} ∇ρ stays within the bound, and every "
+        "start outside the sensing regions reaches the goal without entering the unsafe set.",
         reached.count == reached.total and largest <= U_MAX * (1.0 + 1e-12),
         {
             "starts": reached.total,

@@ -89,9 +89,7 @@ def main(arguments: list[str] | None = None) -> None:
     options = figure_arguments(__doc__, starts=1000, arguments=arguments)
     starts = random_starts(options.starts)
     numbers, shown = {}, {}
-    for gauge, scaling, variance in product(
-        (Gauge.DENSITY, Gauge.LOG), NoiseScaling, VARIANCES
-    ):
+    for gauge, scaling, variance in product((Gauge.DENSITY, Gauge.LOG), NoiseScaling, VARIANCES):
         runs = run(gauge, scaling, variance, starts)
         numbers[f"{gauge} gauge, {scaling} noise, variance {variance:g}"] = summary(runs)
         if scaling is NoiseScaling.WHITE:

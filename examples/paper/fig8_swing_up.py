@@ -14,13 +14,13 @@ from densarm.control.density_tracking import DensityTracking
 from densarm.control.gains import Gains
 from densarm.density import (
     ClearanceSet,
-    DensityParameters,
     GoalDistance,
     NavigationDensity,
     ProductDistance,
     TorusDistance,
 )
-from densarm.density.joint_space_cover import JointSpaceCover, SensingRegion
+from densarm.density.joint_space_cover import JointSpaceCover
+from densarm.density.rim_traps import rim, rim_traps
 from densarm.density.unsafe_set import UnsafeSet
 from densarm.fields.integral_curves import CurveParameters, IntegralCurves, integral_curves
 from densarm.fields.joint_space_field import JointSpaceField, SmallestClearance
@@ -31,6 +31,7 @@ from densarm.reference.timing_parameters import TimingParameters
 from densarm.simulation import FixedStepLoop, LoopEnd, Recording, SimulationParameters
 from densarm.simulation.proportion import Proportion
 from densarm.swept_bound import SweptBound
+from densarm.swept_check import SweptCheck, SweptVerdict
 from densarm.visualization import figure_style as style
 from densarm.visualization.figure_report import FigureReport, figure_arguments
 
@@ -52,7 +53,7 @@ bound = SweptBound(clearance)
 def inertia_weights() -> Array:
     """Weights of V in proportion to the joints' inertia at the goal."""
     inertia = arm.mass_matrix(goal).diagonal()
-    return np.asarray(inertia / inertia.max())
+    return np.asarray(inertia / inertia.min())
 
 
 def sum_distance(weights: Array) -> TorusDistance:
@@ -91,6 +92,10 @@ def basin(distance: GoalDistance, unsafe: UnsafeSet, starts: Array, record: bool
     return Basin(starts, integral_curves(field, starts, CURVES, record))
 
 
+def traps_on_rims(cover: JointSpaceCover, distance: GoalDistance) -> int:
+    return sum(len(rim_traps(arm, region.ellipsoid, distance)) for region in cover.regions)
+
+
 def random_starts(count: int) -> Array:
     """Uniform among the joint positions that touch nothing, within half a turn of the goal."""
     error = np.random.default_rng(8).uniform(-np.pi, np.pi, (2 * count + 50, 2))
@@ -102,11 +107,11 @@ def run_by_torque(unsafe: UnsafeSet, path: Array) -> Recording:
     """Track the timed planning system's curve, joint positions (M, 2), by [ZNV] eq. 17."""
     configurations = arm.configurations(path)
     length = float(np.linalg.norm(np.diff(path, axis=0), axis=1).sum())
-    simulation = SimulationParameters()
+    simulation = SimulationParameters(stall_time=30.0)  # the law decays at K_p/K_v = 0.1/s
     smooth = smooth_path(bound, configurations)
     assert smooth is not None
     reference = time_path(arm, smooth, length, simulation.control_period, TimingParameters())
-    density = NavigationDensity([unsafe], sum_distance(inertia_weights()), DensityParameters())
+    density = NavigationDensity([unsafe], sum_distance(inertia_weights()))
     controller = DensityTracking(arm, density, reference, GAINS)
     return FixedStepLoop(arm, simulation).run(
         controller, configurations[0], goal, not_before=reference.duration
@@ -115,6 +120,12 @@ def run_by_torque(unsafe: UnsafeSet, path: Array) -> Recording:
 
 def smallest_clearance(run: Recording) -> float:
     return min(float(clearance.distances(q).min()) for q in run.q)
+
+
+def is_proved_clear(run: Recording) -> bool:
+    """Whether the swept check proves that nothing was touched between samples either."""
+    departure = np.abs(np.diff(run.v, axis=0)) * np.diff(run.time)[:, np.newaxis] / 8.0
+    return SweptCheck(bound).check(run.q, departure).verdict == SweptVerdict.CLEAR
 
 
 def draw_motion(ax: Axes, run: Recording) -> None:
@@ -155,7 +166,7 @@ def draw_traces(axes: list[Axes], run: Recording) -> None:
         ax.margins(x=0.0)
         ax.grid(alpha=0.3)
     axes[0].set_title("(b) joint positions and velocities (dashed: limits)", fontsize=9.5)
-    axes[0].legend(loc="upper left")
+    axes[0].legend(loc="upper left", fontsize=7, ncols=2)
     axes[2].set_title("(c) torques (dashed: limits)", fontsize=9.5)
     axes[2].set_xlabel("time [s]")
 
@@ -166,33 +177,6 @@ def clearance_map(extent: tuple[float, ...]) -> tuple[Array, Array, Array]:
     return first, second, SmallestClearance(clearance)(np.stack([first, second], axis=-1))
 
 
-def rim(region: SensingRegion, count: int) -> Array:
-    """Points (count, 2) around the rim of a sensing region, in joint positions."""
-    turn = np.linspace(0.0, 2.0 * np.pi, count, endpoint=False)
-    squares, directions = np.linalg.eigh(region.ellipsoid.shape)
-    circle = np.column_stack([np.cos(turn), np.sin(turn)])
-    return np.asarray(region.ellipsoid.centre + circle * np.sqrt(squares) @ directions.T)
-
-
-def traps_on_rim(cover: JointSpaceCover, distance: GoalDistance) -> int:
-    """Count rim points at which V presses inwards and is smallest along the rim.
-
-    A rim without such points is curved enough for the level sets of V: what V presses against it
-    slides off. Where there is one, a spurious maximum of the density waits inside.
-    """
-    count, slope = 0, np.zeros(arm.nv)
-    for region in cover.regions:
-        points = rim(region, 2000)
-        configurations = arm.configurations(points)
-        value = np.array([distance.evaluate(q, slope) for q in configurations])
-        smallest = (value < np.roll(value, 1)) & (value < np.roll(value, -1))
-        for k in np.flatnonzero(smallest):
-            distance.evaluate(configurations[k], slope)
-            outwards = np.linalg.solve(region.ellipsoid.shape, points[k] - region.ellipsoid.centre)
-            count += int(slope @ outwards > 0.0)
-    return count
-
-
 def draw_joint_space(ax: Axes, cover: JointSpaceCover, title: str, beyond: float = 0.0) -> None:
     """The unsafe set and the sensing regions, from π + beyond left of hanging to as much right."""
     extent = (-np.pi - beyond, np.pi + beyond, -np.pi, np.pi)
@@ -200,7 +184,7 @@ def draw_joint_space(ax: Axes, cover: JointSpaceCover, title: str, beyond: float
     ax.contourf(first, second, h, levels=[-np.inf, 0.0], colors=[style.GREY], zorder=2)
     ax.contour(first, second, h, levels=[0.0], colors=[style.BLACK], linewidths=0.8, zorder=2)
     for region in cover.regions:
-        x, y = rim(region, 200).T
+        x, y = rim(region.ellipsoid, 200).T
         for image in (-2.0 * np.pi, 0.0, 2.0 * np.pi):
             ax.plot(x + image, y, color=style.BLACK, linewidth=0.8, linestyle="--", zorder=2)
     style.plane_axes(ax, extent, title)
@@ -216,7 +200,7 @@ def draw_density(ax: Axes, cover: JointSpaceCover, path: Array) -> None:
     field = JointSpaceField(arm, density, clearance)
     first, second = style.plane_grid((-np.pi - 0.5, np.pi + 0.5, -np.pi, np.pi), 150)
     value = field.height(np.stack([first, second], axis=-1))
-    levels = np.arange(-3.0, 3.0, 0.15)
+    levels = np.arange(-5.0, 1.0, 0.15)
     ax.contour(first, second, value, levels, colors=style.SKY, linewidths=0.6, linestyles="-")
     ax.plot(*path.T, color=style.VERMILION, linewidth=1.8, zorder=5, label="planning system")
     ax.plot(*path[0], "o", color=style.VERMILION, markersize=5, zorder=6, label="start")
@@ -274,19 +258,16 @@ def main(arguments: list[str] | None = None) -> None:
     starts = random_starts(options.starts)
     weighted, equal = sum_distance(inertia_weights()), sum_distance(np.ones(arm.nv))
     swing = basin(weighted, cover, np.array([START]), record=True)
-    shown = basin(weighted, cover, starts)
-    traced = basin(weighted, cover, starts[:BY_TORQUE], record=True)
+    shown = basin(weighted, cover, starts, record=True)
     run = run_by_torque(cover, swing.curves.paths[0])
-    runs = [
-        run_by_torque(cover, path)
-        for path, reached in zip(traced.curves.paths, traced.reached, strict=True)
-        if reached
-    ]
+    tracked = np.flatnonzero(shown.reached[:BY_TORQUE])
+    runs = [run_by_torque(cover, shown.curves.paths[k]) for k in tracked]
     few = partial(basin, starts=np.vstack([[START], starts[:COMPARED]]))
     others = [few(equal, cover), few(ProductDistance(arm, goal), cover)]
     figure = draw(cover, swing.curves.paths[0], run, runs, [shown, *others])
     style.save_figure(figure, options.out, "fig8_swing_up")
-    clear = [min(smallest_clearance(each), 1.0) for each in (run, *runs)]
+    clear = [smallest_clearance(each) for each in (run, *runs)]
+    proved = [is_proved_clear(each) for each in (run, *runs)]
     held = [each.end is LoopEnd.REACHED for each in (run, *runs)]
     ratio = max(float((np.abs(each.tau) / arm.limits.effort).max()) for each in (run, *runs))
     bump = ClearanceSet(clearance, 0.0, SIGMA)
@@ -299,9 +280,9 @@ def main(arguments: list[str] | None = None) -> None:
             swing.reached.all()
             and np.mean(shown.reached) >= 0.99
             and shown.curves.count(Outcome.COLLIDED) == 0
-            and len(runs) == len(traced.starts)
+            and len(runs) == len(starts[:BY_TORQUE])
             and all(held)
-            and min(clear) > 0.0
+            and all(proved)
         ),
         {
             "planning_system": shown.summary,
@@ -313,13 +294,14 @@ def main(arguments: list[str] | None = None) -> None:
             "swing_up_reached_by_torque": held[0],
             "swing_up_duration_s": float(run.time[-1]),
             "swing_up_smallest_clearance_m": clear[0],
-            "runs_by_torque": len(traced.starts),
+            "runs_by_torque": len(starts[:BY_TORQUE]),
             "runs_by_torque_reached": sum(held[1:]),
             "runs_by_torque_smallest_clearance_m": min(clear[1:]),
+            "torque_runs_proved_clear_between_samples": sum(proved),
             "peak_torque_ratio": ratio,
             "weights_of_V": inertia_weights().tolist(),
-            "traps_on_rims_inertia_weights": traps_on_rim(cover, weighted),
-            "traps_on_rims_equal_weights": traps_on_rim(cover, equal),
+            "traps_on_rims_inertia_weights": traps_on_rims(cover, weighted),
+            "traps_on_rims_equal_weights": traps_on_rims(cover, equal),
             "sensing_semi_axes_rad": [r.ellipsoid.semi_axes.tolist() for r in cover.regions],
             "other_densities": {
                 "cover, sum with equal weights": others[0].summary,

@@ -19,7 +19,7 @@ from densarm.swept_bound import SweptBound
 
 POTENTIALS = {
     "potential_field": lambda barriers, distance: JointPotentialField(barriers, distance, 0.3, 0.5),
-    "navigation_function": lambda barriers, distance: JointNavigationFunction(barriers, distance),
+    "navigation_function": JointNavigationFunction,
 }
 ARMS = {
     "panda": ("ready", Sphere(name="ball", radius=0.1, position=[0.5, 0.1, 0.4])),
