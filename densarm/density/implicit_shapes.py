@@ -26,7 +26,7 @@ class Ball:
 
     def __call__(self, x: Array) -> Array:
         """Act as `ImplicitFunction.__call__`."""
-        return np.sum(x * x, axis=-1) - self.radius**2  # type: ignore[no-any-return]
+        return np.einsum("...i,...i", x, x) - self.radius**2  # type: ignore[no-any-return]
 
     def gradient(self, x: Array) -> Array:
         """Act as `ImplicitFunction.gradient`."""
@@ -200,7 +200,7 @@ class CShape:
 
     def _across(self, x: Array) -> Array:
         scale = 2.0 * self.radius * self.half_width
-        return (np.sum(x * x, axis=-1) - self.radius**2) / scale  # type: ignore[no-any-return]
+        return (np.einsum("...i,...i", x, x) - self.radius**2) / scale  # type: ignore[no-any-return]
 
     def _beyond(self, x: Array) -> Array:
         return self.sharpness * (x[..., 0] - self.opening)
@@ -234,7 +234,7 @@ class Torus:
 
     def _sum(self, x: Array) -> Array:
         offset = self.major_radius**2 - self.minor_radius**2
-        return np.sum(x * x, axis=-1) + offset  # type: ignore[no-any-return]
+        return np.einsum("...i,...i", x, x) + offset  # type: ignore[no-any-return]
 
 
 @dataclass(frozen=True)

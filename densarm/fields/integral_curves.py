@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from densarm.arrays import Array
-from densarm.density.implicit_function import smallest_value
 from densarm.fields.navigation_field import NavigationField
 from densarm.outcome import Outcome
 from densarm.validation import positive, positive_integer
@@ -129,9 +128,7 @@ class _Front:
     def __init__(self, field: NavigationField, x: Array, parameters: CurveParameters) -> None:
         self.field, self.x, self.parameters = field, x, parameters
         count = len(x)
-        self.smallest_h = np.full(count, np.inf)
-        self.longest = np.empty(count)
-        self._look_around(np.arange(count))
+        self.smallest_h, self.longest = self._surroundings(x)
         self.length = np.zeros(count)
         self.step = np.full(count, parameters.longest_step)
         self.slope = _unit(self.field.direction(self.x))
@@ -148,8 +145,8 @@ class _Front:
         step = np.minimum(self.step[i], self.longest[i])
         ahead, f2, error = self._rosenbrock(x, f0, step)
         height = self.field.height(ahead)
-        entered = smallest_value(self.field.obstacles, ahead) <= 0.0
-        climbed = (height > self.height[i]) | entered
+        smallest, longest = self._surroundings(ahead)
+        climbed = (height > self.height[i]) | (smallest <= 0.0)
         accepted = (error <= p.tolerance) & climbed
         factor = 0.9 * np.cbrt(p.tolerance / np.maximum(error, 1e-300))
         factor = np.where(climbed, np.clip(factor, 0.2, 5.0), np.clip(factor, 0.2, 0.5))
@@ -158,14 +155,15 @@ class _Front:
         self.x[moved], self.slope[moved] = ahead[accepted], f2[accepted]
         self.height[moved] = height[accepted]
         self.length[moved] += np.linalg.norm(ahead - x, axis=-1)[accepted]
-        self._look_around(moved)
+        self.smallest_h[moved] = np.minimum(self.smallest_h[moved], smallest[accepted])
+        self.longest[moved] = longest[accepted]
         self._retire()
         return moved
 
     def _rosenbrock(self, x: Array, f0: Array, step: Array) -> tuple[Array, Array, Array]:
         """Return the points (N, n) a step ahead, the field there, and error estimates (N,)."""
         size = step[:, np.newaxis]
-        system = np.eye(x.shape[-1]) - _DAMPING * size[..., np.newaxis] * self._jacobian(x)
+        system = np.eye(x.shape[-1]) - _DAMPING * size[..., np.newaxis] * self._jacobian(x, f0)
 
         def solve(right: Array) -> Array:
             k = np.linalg.solve(system, right[..., np.newaxis])[..., 0]
@@ -180,23 +178,22 @@ class _Front:
         k3 = solve(f2 - _ERROR_WEIGHT * (k2 - f1) - 2.0 * (k1 - f0))
         return ahead, f2, step / 6.0 * np.linalg.norm(k1 - 2.0 * k2 + k3, axis=-1)
 
-    def _jacobian(self, x: Array) -> Array:
-        """Return ∂f/∂x (N, n, n) at points (N, n), by central differences."""
+    def _jacobian(self, x: Array, f0: Array) -> Array:
+        """Return ∂f/∂x (N, n, n) at points (N, n) with values `f0` (N, n), by differences."""
         axes = _DIFFERENCE * np.eye(x.shape[-1])
-        both = self._unit_at(x[:, np.newaxis, :] + np.concatenate([axes, -axes]))
-        ahead, behind = np.split(both, 2, axis=1)
-        return np.swapaxes(ahead - behind, 1, 2) / (2.0 * _DIFFERENCE)
+        ahead = self._unit_at(x[:, np.newaxis, :] + axes)
+        return np.swapaxes(ahead - f0[:, np.newaxis, :], 1, 2) / _DIFFERENCE
 
-    def _look_around(self, i: NDArray[np.intp]) -> None:
-        """Update smallest values of h and longest steps of the curves `i`."""
-        p, x = self.parameters, self.x[i]
+    def _surroundings(self, x: Array) -> tuple[Array, Array]:
+        """Return the smallest h (N,) and the longest step [m] at points (N, n)."""
+        p, smallest = self.parameters, np.full(len(x), np.inf)
         longest = 0.5 * np.linalg.norm(x - self.field.goal, axis=-1)
         for obstacle in self.field.obstacles:
             h, slope = obstacle(x), np.linalg.norm(obstacle.gradient(x), axis=-1)
-            self.smallest_h[i] = np.minimum(self.smallest_h[i], h)
+            smallest = np.minimum(smallest, h)
             distance = np.abs(h) / np.maximum(slope, 1e-300)
             longest = np.minimum(longest, p.clearance_share * distance + p.tolerance)
-        self.longest[i] = longest
+        return smallest, longest
 
     def _retire(self) -> None:
         """Give every active curve that has ended its outcome."""

@@ -2,7 +2,7 @@ import json
 import runpy
 from pathlib import Path
 
-SCRIPT = Path(__file__).parents[1] / "examples" / "paper" / "fig8_swing_up.py"
+SCRIPT = Path(__file__).parents[2] / "examples" / "paper" / "fig8_swing_up.py"
 
 
 def test_swing_up_without_a_planner(tmp_path):
