@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 from typing import Any
-from zipfile import BadZipFile
+from zipfile import BadZipFile, is_zipfile
 
 import numpy as np
 
@@ -108,6 +108,8 @@ class Trajectory:
             DensarmError: its scenario cannot be rebuilt, e.g. since a mesh has changed.
         """
         try:
+            if Path(path).is_file() and not is_zipfile(path):
+                raise FileContentError(path, "not a run: not a .npz file")
             with Path(path).open("rb") as file, np.load(file, allow_pickle=False) as data:
                 arrays = {name: np.asarray(data[name], dtype=np.float64) for name in _ARRAYS}
                 scenario = json.loads(str(data["scenario"]))
@@ -122,7 +124,9 @@ class Trajectory:
                 tracking_error=None if deviation is None else float(deviation),
             )._checked()
         except OSError as error:
-            raise FileContentError(path, error.strerror or "not a run: not a .npz file") from None
+            raise FileContentError(path, error.strerror or "cannot be read") from None
+        except FileContentError:
+            raise
         except DensarmError as error:
             raise FileContentError(path, f"not a run: {error}") from None
         except (ValueError, KeyError, TypeError, AttributeError, EOFError, *_DAMAGE) as error:

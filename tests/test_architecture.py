@@ -50,6 +50,7 @@ LAYERS = (
     ("visualization",),
     ("__init__",),
     ("cli",),
+    ("__main__",),
 )
 RANK = {name: rank for rank, layer in enumerate(LAYERS) for name in layer}
 
