@@ -7,12 +7,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from densarm.atomic_file import atomic_file
-from densarm.errors import InvalidValueError
 from densarm.outcome import Outcome
 from densarm.study.comparison import OUTCOMES, Comparison
+from densarm.visualization.figure_file import save_figure
 from densarm.visualization.figure_style import BLACK, BLUE, GREY, OUTCOME_COLOUR, new_figure
-from densarm.visualization.plots import FORMATS
 
 _PANELS = {
     "time_s": ("time [s]", 1.0),
@@ -34,12 +32,7 @@ def save_comparison_plot(comparison: Comparison, path: str | Path) -> None:
         InvalidValueError: another ending.
         FileContentError: the file cannot be written.
     """
-    path = Path(path)
-    kind = path.suffix.removeprefix(".").lower()
-    if kind not in FORMATS:
-        raise InvalidValueError("plot", str(path), "a file ending in ." + ", .".join(FORMATS))
-    with atomic_file(path) as file:
-        comparison_figure(comparison).savefig(file, format=kind)
+    save_figure(comparison_figure(comparison), path)
 
 
 def comparison_figure(comparison: Comparison) -> Figure:

@@ -9,12 +9,8 @@ from matplotlib.figure import Figure
 from matplotlib.typing import ColorType
 
 from densarm.arrays import Array
-from densarm.atomic_file import atomic_file
-from densarm.errors import InvalidValueError
 from densarm.trajectory import Trajectory
-
-FORMATS = ("png", "pdf", "svg")
-"""Formats that `save_plot` writes, by the file's ending."""
+from densarm.visualization.figure_file import save_figure
 
 _NEAR = 0.5  # of the plotted range
 
@@ -30,12 +26,7 @@ def save_plot(run: Trajectory, path: str | Path) -> None:
         InvalidValueError: another ending.
         FileContentError: the file cannot be written.
     """
-    path = Path(path)
-    kind = path.suffix.removeprefix(".").lower()
-    if kind not in FORMATS:
-        raise InvalidValueError("plot", str(path), "a file ending in ." + ", .".join(FORMATS))
-    with atomic_file(path) as file:
-        run_figure(run).savefig(file, format=kind)
+    save_figure(run_figure(run), path)
 
 
 def run_figure(run: Trajectory) -> Figure:
