@@ -105,6 +105,8 @@ class JointLimitSet:
 
     def add_log_bump(self, q: Array, theta: float, out_gradient: Array) -> float:
         """Act as `UnsafeSet.add_log_bump`."""
+        if not self._bound.size:
+            return 0.0
         return accumulate_limit_log_bumps(
             q,
             self._index_q,

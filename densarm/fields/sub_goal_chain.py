@@ -5,7 +5,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from densarm.arrays import Array
-from densarm.compiled import compiled
 from densarm.errors import InvalidValueError
 from densarm.guides.guide import GuidePath
 from densarm.swept_bound import SweptBound
@@ -108,17 +107,17 @@ class SubGoalChain:
             Whether the current sub-goal changed.
         """
         before = self.current
-        while not self.is_last and _in_sight(
-            self._bound.lever,
-            np.abs(self._bound.arm.difference(q, self.q[self.current + 1])),
-            distance,
-            self._bound.margin,
-            self.slack[self.current + 1],
-            self.sensing_distance[self.current + 1],
-            self.SIGHT,
-        ):
+        while not self.is_last and self._is_in_sight(self.current + 1, q, distance):
             self.current += 1
         return self.current != before
+
+    def _is_in_sight(self, index: int, q: Array, distance: Array) -> bool:
+        bound = self._bound
+        step = bound.arm.difference(q, self.q[index])
+        if np.abs(step).max() > self.SIGHT:
+            return False
+        room = distance - bound.margin + self.slack[index] - 2.0 * self.sensing_distance[index]
+        return bool((bound.motion(step) < room).all())
 
 
 def _refine(bound: SweptBound, path: GuidePath) -> Array:
@@ -138,25 +137,3 @@ def _shifted(rows: Array, by: int) -> Array:
     """Return rows moved down by one, or up by -1, the end row standing twice."""
     index = np.clip(np.arange(len(rows)) - by, 0, len(rows) - 1)
     return rows[index]
-
-
-@compiled
-def _in_sight(
-    lever: Array,
-    step: Array,
-    distance: Array,
-    margin: float,
-    slack: Array,
-    sensing_distance: Array,
-    sight: float,
-) -> bool:
-    for j in range(step.shape[0]):
-        if step[j] > sight:
-            return False
-    for k in range(lever.shape[0]):
-        motion = 2.0 * sensing_distance[k]
-        for j in range(lever.shape[1]):
-            motion += lever[k, j] * step[j]
-        if motion >= distance[k] - margin + slack[k]:
-            return False
-    return True
