@@ -10,7 +10,7 @@ from densarm.fields.guided_density import GuidedDensity
 from densarm.fields.planning_system import PlanningSystem
 from densarm.fields.sub_goal_chain import SubGoalChain
 from densarm.guides.direct import DirectGuide
-from densarm.guides.guide import Guide, NoPath
+from densarm.guides.guide import Guide, GuidePath, NoPath
 from densarm.guides.path import PathGuide
 from densarm.reference.reference import Reference
 from densarm.scenario import ControlForm, GuideKind, Scenario
@@ -19,6 +19,9 @@ from densarm.swept_bound import SweptBound
 
 _LIMIT_INSET = 0.2 * REACHED_POSITION
 """Distance from position limits that the motion leaves and reaches its ends at [rad or m]."""
+
+_ROOM_SHARES = (1.0, 0.2)
+"""Shares of the path margin, tried in turn: a narrow passage may leave less room than it wants."""
 
 _END_SHARE = 0.5
 """Share of the clearance at start and goal that a path's margin may take."""
@@ -49,18 +52,16 @@ def plan_motion(
     Raises:
         InfeasibleTimingError: the limits allow no motion along the path.
     """
-    arm, control = scenario.arm, scenario.control
-    start, goal = scenario.start, scenario.goal
+    start, goal, control = scenario.start, scenario.goal, scenario.control
     bound = SweptBound(clearance, control.margin)
     depart, arrive = (_inside_limits(bound, q) for q in (start, goal))
     ends = min(bound.slack(q).min(initial=np.inf) for q in (start, depart, arrive))
     room = max(0.0, min(control.path_margin, _END_SHARE * ends))
-    path_bound = bound.with_margin(control.margin + room)
-    if guide == GuideKind.DIRECT:
-        guide = DirectGuide()
-    elif guide == GuideKind.PATH:
-        guide = PathGuide(arm, path_bound, scenario.planning)
-    path = guide.plan(depart, arrive, scenario.seed)
+    for share in _ROOM_SHARES:
+        path_bound = bound.with_margin(control.margin + share * room)
+        path = _chosen(guide, scenario, path_bound).plan(depart, arrive, scenario.seed)
+        if isinstance(path, GuidePath):
+            break
     if isinstance(path, NoPath):
         return path
     chain = SubGoalChain(bound, path, scenario.sensing)
@@ -71,11 +72,20 @@ def plan_motion(
         return MotionPlan(guided, bound, reference=None)
     curve = PlanningSystem(guided, bound).integrate(depart)
     guided.restart()
-    smooth_bound = bound.with_margin(control.margin + (0.5 * room if path.is_clear else 0.0))
+    kept = 0.5 * (path_bound.margin - control.margin) if path.is_clear else 0.0
+    smooth_bound = bound.with_margin(control.margin + kept)
     reference = _reference(scenario, smooth_bound, np.vstack([start, curve.q]))
     if reference is None:
         return NoPath("no smooth path near the planning system's curve is proved clear")
     return MotionPlan(guided, bound, reference)
+
+
+def _chosen(guide: Guide | GuideKind, scenario: Scenario, bound: SweptBound) -> Guide:
+    if guide == GuideKind.DIRECT:
+        return DirectGuide()
+    if guide == GuideKind.PATH:
+        return PathGuide(scenario.arm, bound, scenario.planning)
+    return guide
 
 
 def _inside_limits(bound: SweptBound, q: Array) -> Array:

@@ -10,7 +10,8 @@ from densarm.swept_check import SweptCheck, SweptVerdict
 _DEGREE = 3
 _WIDEST = 0.8  # [rad] between control points at first
 _HALVINGS = 9
-_SAMPLE = 0.01  # [rad] between the samples that the proof uses
+_SAMPLE = 0.01  # [rad] at most between the samples that the proof uses
+_PARTS = 4  # at least, that each polynomial piece is sampled in
 
 
 class SmoothPath:
@@ -71,9 +72,13 @@ def _spline(length: Array, corner: Array, count: int) -> SmoothPath:
 def _is_clear(
     check: SweptCheck, bound: SweptBound, path: SmoothPath, origin: Array, q0: Array, length: float
 ) -> bool:
-    s = np.linspace(0.0, 1.0, 2 + int(length / _SAMPLE))
+    pieces = np.unique(path.knots)
+    parts = max(_PARTS, int(np.ceil(length / (len(pieces) - 1) / _SAMPLE)))
+    at = np.arange(parts * (len(pieces) - 1) + 1) / parts
+    s = np.interp(at, np.arange(len(pieces)), pieces)
     q = bound.arm.integrate(q0, path(s) - origin)
-    # The second derivative is linear on each piece, so that it is largest where pieces meet.
-    curvature = np.abs(path(path.knots, 2)).max(axis=0)
-    departure = np.broadcast_to(curvature / 8.0 * (s[1] - s[0]) ** 2, (len(s) - 1, bound.arm.nv))
+    # The second derivative is linear between samples, so that it is largest at one of them.
+    curvature = np.abs(path(s, 2))
+    largest = np.maximum(curvature[:-1], curvature[1:])
+    departure = largest / 8.0 * np.diff(s)[:, np.newaxis] ** 2
     return check.check(q, departure).verdict == SweptVerdict.CLEAR
