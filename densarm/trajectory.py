@@ -48,9 +48,14 @@ class Trajectory:
         return certify(self.scenario, self.time, self.q, self.v, self.tau)
 
     @cached_property
+    def certificate(self) -> Certificate:
+        """What `verify` found when it was first asked for."""
+        return self.verify()
+
+    @property
     def certified(self) -> bool:
-        """Whether `verify` holds in every part."""
-        return self.verify().certified
+        """Whether the certificate holds in every part."""
+        return self.certificate.certified
 
     @property
     def goal_error(self) -> float:

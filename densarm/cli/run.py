@@ -61,7 +61,7 @@ def run(
 
         trajectory = simulate(load_scenario(scenario), guide, seed, on_progress=report)
         report("proving")
-        certificate = trajectory.verify()
+        certificate = trajectory.certificate
         report("writing")
         if save:
             trajectory.save(save)
