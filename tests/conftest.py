@@ -1,7 +1,9 @@
 import os
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 from hypothesis import settings
 
@@ -30,3 +32,21 @@ def chromium() -> str:
 def swing_up_run() -> "densarm.Trajectory":
     """A certified run of swing_up."""
     return densarm.simulate(densarm.load_scenario("swing_up"))
+
+
+@pytest.fixture(scope="session")
+def fenced_in() -> "densarm.Scenario":
+    """A swing-up inside a ring of balls, to a goal that a short search finds no path to."""
+    swing_up = densarm.load_scenario("swing_up")
+    ring = [
+        densarm.Sphere(
+            name=f"ball{k}", radius=0.2, position=[2.1 * np.sin(a), 0.0, -2.1 * np.cos(a)]
+        )
+        for k, a in enumerate(np.linspace(0.3, 2 * np.pi - 0.3, 40))
+    ]
+    return replace(
+        swing_up,
+        scene=densarm.Scene(ring),
+        goal=swing_up.arm.configuration((1.0, 0.5)),
+        planning=replace(swing_up.planning, iterations=50, searches=1),
+    )

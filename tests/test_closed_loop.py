@@ -101,17 +101,8 @@ def test_goal_at_the_start_is_reached_at_once(swing_up):
     assert run.certified
 
 
-def test_no_path(swing_up):
-    ring = [
-        Sphere(name=f"ball{k}", radius=0.2, position=(2.1 * np.sin(a), 0.0, -2.1 * np.cos(a)))
-        for k, a in enumerate(np.linspace(0.3, 2 * np.pi - 0.3, 40))
-    ]
-    few = replace(swing_up.planning, iterations=50, searches=1)
-    run = simulate(
-        replace(
-            swing_up, scene=Scene(ring), goal=swing_up.arm.configuration((1.0, 0.5)), planning=few
-        )
-    )
+def test_no_path(fenced_in):
+    run = simulate(fenced_in)
     assert run.outcome in (Outcome.NO_PATH, Outcome.INFEASIBLE)
     assert len(run.q) == 1
 

@@ -10,7 +10,6 @@ from densarm.guides import DirectGuide, GuidePath, NoPath
 from densarm.motion_plan import plan_motion
 from densarm.reference import InfeasibleTimingError
 from densarm.scenario import ControlForm, GuideKind, load_scenario
-from densarm.scene import Scene, Sphere
 
 
 @pytest.fixture(scope="module")
@@ -43,17 +42,8 @@ def test_goal_at_the_start_is_a_reference_at_rest(swing_up):
     np.testing.assert_array_equal(plan.reference.velocity, 0.0)
 
 
-def test_goal_out_of_reach_is_no_path(swing_up):
-    ring = [
-        Sphere(name=f"ball{k}", radius=0.2, position=(2.1 * np.sin(a), 0.0, -2.1 * np.cos(a)))
-        for k, a in enumerate(np.linspace(0.3, 2 * np.pi - 0.3, 40))
-    ]
-    few = replace(swing_up.planning, iterations=50, searches=1)
-    plan = planned(
-        replace(
-            swing_up, scene=Scene(ring), goal=swing_up.arm.configuration((1.0, 0.5)), planning=few
-        )
-    )
+def test_goal_out_of_reach_is_no_path(fenced_in):
+    plan = planned(fenced_in)
     assert isinstance(plan, NoPath)
 
 
