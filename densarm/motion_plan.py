@@ -14,6 +14,7 @@ from densarm.guides.guide import Guide, GuidePath, NoPath
 from densarm.guides.path import PathGuide
 from densarm.reference.reference import Reference
 from densarm.scenario import ControlForm, GuideKind, Scenario
+from densarm.separating_planes import SeparatingPlanes
 from densarm.simulation.fixed_step_loop import REACHED_POSITION
 from densarm.swept_bound import SweptBound
 
@@ -84,7 +85,7 @@ def _chosen(guide: Guide | GuideKind, scenario: Scenario, bound: SweptBound) -> 
     if guide == GuideKind.DIRECT:
         return DirectGuide()
     if guide == GuideKind.PATH:
-        return PathGuide(scenario.arm, bound, scenario.planning)
+        return PathGuide(scenario.arm, SeparatingPlanes(bound), scenario.planning)
     return guide
 
 

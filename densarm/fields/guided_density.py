@@ -67,6 +67,18 @@ class GuidedDensity:
             self._point_at_sub_goal()
             self.density.update(q)
 
+    def sub_goal_in_sight(self, q: Array) -> Array | None:
+        """Return the sub-goal (nq,) if Ψ = 1 on the segment to it from q (nq,), which was updated.
+
+        There ρ depends on V alone, and grows along the segment.
+        """
+        chain = self.chain
+        if self.density.log_psi < 0.0 or not chain.is_in_sight(
+            chain.current, q, self.clearance.distance
+        ):
+            return None
+        return np.asarray(chain.q[chain.current])
+
     def write_gradient(self, q: Array, out: Array) -> None:
         """Write ∇ρ (nv,) in the density's own gauge and blend into `out`; q (nq,) was updated."""
         if self.density.parameters.blend_radius > 0.0:

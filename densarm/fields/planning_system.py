@@ -27,7 +27,8 @@ class PlanningSystem:
 
     Every step goes up the density: it is halved until ρ has grown. No step is longer than twice
     the last one, or than a share of the clearance ahead, so that none jumps through an obstacle.
-    A curve that can no longer climb has met a critical point of ρ.
+    Where nothing is sensed on the segment to a sub-goal, that segment is the step. A curve that
+    can no longer climb has met a critical point of ρ.
 
     Args:
         guided: the density and its sub-goals.
@@ -62,7 +63,9 @@ class PlanningSystem:
             error = guided.goal_distance.error(q)
             if guided.chain.is_last and np.abs(error).max() <= self.SMALLEST_STEP:
                 return PlannedCurve(np.array([*points[:-1], goal]), reached=True, detail="")
-            q_next = self._climb(q, min(self.STEP, 2.0 * length, float(np.linalg.norm(error))))
+            q_next = guided.sub_goal_in_sight(q)
+            if q_next is None:
+                q_next = self._climb(q, min(self.STEP, 2.0 * length, float(np.linalg.norm(error))))
             if q_next is None:
                 break
             length = float(np.linalg.norm(self._arm.difference(q, q_next)))

@@ -107,11 +107,18 @@ class SubGoalChain:
             Whether the current sub-goal changed.
         """
         before = self.current
-        while not self.is_last and self._is_in_sight(self.current + 1, q, distance):
+        while not self.is_last and self.is_in_sight(self.current + 1, q, distance):
             self.current += 1
         return self.current != before
 
-    def _is_in_sight(self, index: int, q: Array, distance: Array) -> bool:
+    def is_in_sight(self, index: int, q: Array, distance: Array) -> bool:
+        """Return whether a sub-goal is in sight, as the class says.
+
+        Args:
+            index: of the sub-goal.
+            q: configuration of the arm (nq,).
+            distance: distances of all pairs there (K,) [m].
+        """
         bound = self._bound
         step = bound.arm.difference(q, self.q[index])
         if np.abs(step).max() > self.SIGHT:
