@@ -42,12 +42,21 @@ def joint_chain(model: pin.Model) -> JointChain:
 
 
 @compiled
-def write_placements(chain: JointChain, angles: Array, rotation: Array, translation: Array) -> None:
-    """Write where the joints' frames are.
+def write_placements(
+    chain: JointChain,
+    angles: Array,
+    step: Array,
+    share: float,
+    rotation: Array,
+    translation: Array,
+) -> None:
+    """Write where the joints' frames are after a share of a motion.
 
     Args:
         chain: the joints.
         angles: joint positions (nv,) [rad or m].
+        step: motion of the joints (nv,) [rad or m].
+        share: of the motion that was made.
         rotation: of the frames in the world (njoints, 3, 3), overwritten.
         translation: of the frames in the world (njoints, 3) [m], overwritten.
 
@@ -58,7 +67,7 @@ def write_placements(chain: JointChain, angles: Array, rotation: Array, translat
         for j in range(3):
             rotation[0, i, j] = 1.0 if i == j else 0.0
     for joint in range(1, chain.parent.size):
-        parent, position = chain.parent[joint], angles[joint - 1]
+        parent, position = chain.parent[joint], angles[joint - 1] + share * step[joint - 1]
         slide = position if chain.slides[joint] else 0.0
         turn = 0.0 if chain.slides[joint] else position
         x, y, z = chain.axis[joint, 0], chain.axis[joint, 1], chain.axis[joint, 2]

@@ -101,18 +101,23 @@ def near_pairs(
     pairs, ball, half_side = bodies.pairs, bodies.ball, bodies.half_side
     for pair in range(motion.size):
         i, j = pairs[pair, 0], pairs[pair, 1]
-        apart = -2.0 * kept
-        for rotation, translation in (
-            (at_a.rotation, at_a.translation),
-            (at_b.rotation, at_b.translation),
-        ):
-            one = _outside_box(rotation, translation, half_side, i, j) - ball[i]
-            other = _outside_box(rotation, translation, half_side, j, i) - ball[j]
-            apart += max(one, other)
+        apart_a = _apart(at_a.rotation, at_a.translation, half_side, ball, i, j)
+        apart_b = _apart(at_b.rotation, at_b.translation, half_side, ball, i, j)
+        apart = apart_a + apart_b - 2.0 * kept
         if not apart > motion[pair]:
             near[count] = pair
             count += 1
     return near[:count]
+
+
+@compiled
+def _apart(
+    rotation: Array, translation: Array, half_side: Array, ball: Array, i: int, j: int
+) -> float:
+    """Return by how much the ball around one shape is outside the box around the other [m]."""
+    one = _outside_box(rotation, translation, half_side, i, j) - ball[i]
+    other = _outside_box(rotation, translation, half_side, j, i) - ball[j]
+    return float(one if one > other else other)
 
 
 @compiled
@@ -133,15 +138,17 @@ def _outside_box(
 
 
 @compiled
-def place(bodies: MovingHulls, at: Placements, angles: Array) -> None:
+def place(bodies: MovingHulls, at: Placements, angles: Array, step: Array, share: float) -> None:
     """Write where the shapes that move are.
 
     Args:
         bodies: the shapes and the joints that move them.
         at: placements to overwrite.
         angles: joint positions (nv,) [rad or m].
+        step: motion of the joints (nv,) [rad or m].
+        share: of the motion that was made.
     """
-    write_placements(bodies.chain, angles, at.joint_rotation, at.joint_translation)
+    write_placements(bodies.chain, angles, step, share, at.joint_rotation, at.joint_translation)
     for shape in range(bodies.joint.size):
         joint = bodies.joint[shape]
         if joint == 0:

@@ -89,19 +89,19 @@ def _segment_is_clear(
     depth: int,
 ) -> bool:
     """Prove all pairs; arcs that two distances do not prove are halved, all of a length in turn."""
-    place(bodies, at_a, angles)
-    place(bodies, at_b, angles + step)
+    place(bodies, at_a, angles, step, 0.0)
+    place(bodies, at_b, angles, step, 1.0)
     pair = near_pairs(bodies, at_a, at_b, motion, kept)
     count, arc = pair.size, np.zeros(pair.size, np.int64)
     slack_a, slack_b, middle = np.empty(count), np.empty(count), np.empty(count)
     # The far end first: planners start from an end that is clear.
-    if not _write_slack(bodies, at_b, corners, pair, 0, count, kept, motion, slack_b):
+    if not _write_slack(bodies, at_b, corners, pair, kept, motion, 1.0, slack_b):
         return False
-    if not _write_slack(bodies, at_a, corners, pair, 0, count, kept, motion, slack_a):
+    if not _write_slack(bodies, at_a, corners, pair, kept, motion, 1.0, slack_a):
         return False
     for level in range(depth + 1):
         share = 0.5**level
-        count = _keep_open(pair, arc, slack_a, slack_b, count, share * motion)
+        count = _keep_open(pair, arc, slack_a, slack_b, count, motion, share)
         if count == 0 or level == depth:
             break
         middle, begin = np.empty(count), 0
@@ -109,9 +109,10 @@ def _segment_is_clear(
             end = begin
             while end < count and arc[end] == arc[begin]:
                 end += 1
-            place(bodies, at_a, angles + (arc[begin] + 0.5) * share * step)
-            enough = 0.5 * share * motion
-            if not _write_slack(bodies, at_a, corners, pair, begin, end, kept, enough, middle):
+            place(bodies, at_a, angles, step, (arc[begin] + 0.5) * share)
+            if not _write_slack(
+                bodies, at_a, corners, pair[begin:end], kept, motion, 0.5 * share, middle[begin:end]
+            ):
                 return False
             begin = end
         pair, arc, slack_a, slack_b = _halves(pair, arc, slack_a, middle, slack_b)
@@ -127,11 +128,12 @@ def _keep_open(
     slack_b: Array,
     count: int,
     motion: Array,
+    share: float,
 ) -> int:
     """Move to the front what the slack at both ends of an arc does not prove; return its number."""
     kept = 0
     for i in range(count):
-        if not slack_a[i] + slack_b[i] > motion[pair[i]]:
+        if not slack_a[i] + slack_b[i] > share * motion[pair[i]]:
             pair[kept], arc[kept] = pair[i], arc[i]
             slack_a[kept], slack_b[kept] = slack_a[i], slack_b[i]
             kept += 1
@@ -167,21 +169,21 @@ def _write_slack(
     at: Placements,
     corners: NDArray[np.int64],
     pair: NDArray[np.int64],
-    begin: int,
-    end: int,
     kept: float,
-    enough: Array,
+    motion: Array,
+    share: float,
     slack: Array,
 ) -> bool:
     """Write lower bounds on by how much pairs exceed what is to be kept, while they do [m]."""
     hulls, pairs, rotation, translation = bodies.hulls, bodies.pairs, at.rotation, at.translation
     between, offset = np.empty((3, 3)), np.empty(3)
-    for n in range(begin, end):
+    for n in range(pair.size):
         k = pair[n]
         i, j = pairs[k, 0], pairs[k, 1]
         write_relative(rotation, translation, i, j, between, offset)
         held = kept + hulls.radius[i] + hulls.radius[j]
-        slack[n] = separation(hulls, between, offset, enough[k] + held, corners[k]) - held
+        enough = share * motion[k] + held
+        slack[n] = separation(hulls, between, offset, enough, corners[k]) - held
         if not slack[n] > 0.0:
             return False
     return True

@@ -17,6 +17,8 @@ ACCURACY = 0.01
 
 _ITERATIONS = 40
 _CONTACT = 1e-9  # [m], closer than this no plane is looked for
+_NO_WEIGHT = 1e-12
+_FLAT = 1e-12  # of a corner's squared distance, what may be left of it beside the others
 
 
 class RoundedHulls(NamedTuple):
@@ -88,30 +90,33 @@ def separation(
         Objects in Three-Dimensional Space, IEEE J. Robotics and Automation 1988.
     """
     points, neighbours, first_neighbour = hulls.points, hulls.neighbours, hulls.first_neighbour
-    simplex = np.empty((4, 3))
+    simplex, weight, v = np.empty((4, 3)), np.ones(4), np.empty(3)
     count = 0
     while count < 4 and corners[count, 0] >= 0:
         _write_difference(points, rotation, translation, corners[count], simplex[count])
         count += 1
+    weight /= count
     best = 0.0
     for _ in range(_ITERATIONS):
-        count, x, y, z = _nearest(simplex, corners, count)
-        norm = math.sqrt(x * x + y * y + z * z)
+        count = _approach_origin(simplex, corners, weight, count, v)
+        norm = math.sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2])
         if count == 0 or norm < _CONTACT:  # the bodies may overlap
             count = max(count, 1)
             break
         start, new, w = corners[count - 1], corners[count], simplex[count]
-        turned = _turned(rotation, -x, -y, -z)
+        turned = _turned(rotation, -v[0], -v[1], -v[2])
         new[0] = _farthest(points, neighbours, first_neighbour, start[0], *turned)
-        new[1] = _farthest(points, neighbours, first_neighbour, start[1], x, y, z)
+        new[1] = _farthest(points, neighbours, first_neighbour, start[1], v[0], v[1], v[2])
         _write_difference(points, rotation, translation, new, w)
-        best = max(best, (x * w[0] + y * w[1] + z * w[2]) / norm)
+        best = max(best, (v[0] * w[0] + v[1] * w[1] + v[2] * w[2]) / norm)
         if _is_known(corners, count):
             break
+        weight[count] = 0.0
         count += 1
         if best >= enough or best >= (1.0 - ACCURACY) * norm:
             break
-    corners[count:] = -1
+    for i in range(count, 4):
+        corners[i, 0] = corners[i, 1] = -1
     return best
 
 
@@ -169,98 +174,79 @@ def _is_known(corners: NDArray[np.int64], count: int) -> bool:
 
 
 @compiled
-def _nearest(
-    simplex: Array, corners: NDArray[np.int64], count: int
-) -> tuple[int, float, float, float]:
-    """Reduce a simplex to the face that holds its point nearest to the origin.
+def _approach_origin(
+    simplex: Array, corners: NDArray[np.int64], weight: Array, count: int, out: Array
+) -> int:
+    """Reduce a simplex to a face whose plane is nearest to the origin inside that face.
+
+    Args:
+        simplex: its corners (4, 3), those that are kept moved to the front.
+        corners: what they are differences of (4, 2), moved alike.
+        weight: of the corners (4,), >= 0: the point to start from; overwritten.
+        count: number of corners.
+        out: the nearest point (3,), overwritten.
 
     Returns:
-        The number of corners left, moved to the front, and the point; 0 corners if the origin is
-        inside a tetrahedron.
+        The number of corners left; 0 if the origin is inside a tetrahedron.
+
+    Source: Wolfe, Finding the Nearest Point in a Polytope, Mathematical Programming 1976.
     """
-    if count == 1:
-        return 1, simplex[0, 0], simplex[0, 1], simplex[0, 2]
-    if count == 2:
-        mask, x, y, z = _nearest_on_segment(simplex, 0, 1)
-    elif count == 3:
-        mask, x, y, z = _nearest_on_triangle(simplex, 0, 1, 2)
-    else:
-        mask, x, y, z = _nearest_on_tetrahedron(simplex)
-    kept = 0
-    for i in range(count):
-        if mask & (1 << i):
+    affine = np.empty(4)
+    before = 0
+    while count != before:
+        before = count
+        if not _write_affine_weights(simplex, count, affine):
+            count -= 1  # the newest corner depends on the others
+            continue
+        share = 1.0
+        for i in range(count):
+            if affine[i] <= 0.0:
+                share = min(share, weight[i] / (weight[i] - affine[i]))
+        count = 0
+        for i in range(before):
+            value = weight[i] + share * (affine[i] - weight[i])
+            if value > _NO_WEIGHT:
+                weight[count] = value
+                corners[count, 0], corners[count, 1] = corners[i, 0], corners[i, 1]
+                for k in range(3):
+                    simplex[count, k] = simplex[i, k]
+                count += 1
+    for k in range(3):
+        out[k] = 0.0
+        for i in range(count):
+            out[k] += weight[i] * simplex[i, k]
+    return 0 if count == 4 else count
+
+
+@compiled
+def _write_affine_weights(simplex: Array, count: int, weight: Array) -> bool:
+    """Write weights (count,) of the point nearest to the origin in the plane through all corners.
+
+    Returns:
+        Whether the corners are independent; else nothing is written.
+    """
+    n = count - 1
+    system = np.empty((3, 4))  # of the normal equations, with their right-hand side
+    for i in range(n):
+        for j in range(n + 1):
+            system[i, j] = 0.0
             for k in range(3):
-                simplex[kept, k] = simplex[i, k]
-            corners[kept, 0], corners[kept, 1] = corners[i, 0], corners[i, 1]
-            kept += 1
-    return kept, x, y, z
-
-
-@compiled
-def _nearest_on_segment(s: Array, i: int, j: int) -> tuple[int, float, float, float]:
-    dx, dy, dz = s[j, 0] - s[i, 0], s[j, 1] - s[i, 1], s[j, 2] - s[i, 2]
-    along = -(s[i, 0] * dx + s[i, 1] * dy + s[i, 2] * dz)
-    square = dx * dx + dy * dy + dz * dz
-    if along <= 0.0:
-        return 1 << i, s[i, 0], s[i, 1], s[i, 2]
-    if along >= square:
-        return 1 << j, s[j, 0], s[j, 1], s[j, 2]
-    t = along / square
-    return (1 << i) | (1 << j), s[i, 0] + t * dx, s[i, 1] + t * dy, s[i, 2] + t * dz
-
-
-@compiled
-def _nearest_on_triangle(s: Array, i: int, j: int, k: int) -> tuple[int, float, float, float]:
-    """Return the corners of the nearest face of a triangle as bits, and its nearest point."""
-    ux, uy, uz = s[j, 0] - s[i, 0], s[j, 1] - s[i, 1], s[j, 2] - s[i, 2]
-    wx, wy, wz = s[k, 0] - s[i, 0], s[k, 1] - s[i, 1], s[k, 2] - s[i, 2]
-    nx, ny, nz = uy * wz - uz * wy, uz * wx - ux * wz, ux * wy - uy * wx
-    square = nx * nx + ny * ny + nz * nz
-    if square > 0.0:
-        # Barycentric coordinates of the origin's projection.
-        px, py, pz = -s[i, 0], -s[i, 1], -s[i, 2]
-        b = (
-            (py * wz - pz * wy) * nx + (pz * wx - px * wz) * ny + (px * wy - py * wx) * nz
-        ) / square
-        c = (
-            (uy * pz - uz * py) * nx + (uz * px - ux * pz) * ny + (ux * py - uy * px) * nz
-        ) / square
-        if b >= 0.0 and c >= 0.0 and b + c <= 1.0:
-            height = (s[i, 0] * nx + s[i, 1] * ny + s[i, 2] * nz) / square
-            return (1 << i) | (1 << j) | (1 << k), height * nx, height * ny, height * nz
-    mask, x, y, z = _nearest_on_segment(s, i, j)
-    least = x * x + y * y + z * z
-    for first, second in ((j, k), (k, i)):
-        other, ox, oy, oz = _nearest_on_segment(s, first, second)
-        value = ox * ox + oy * oy + oz * oz
-        if value < least:
-            mask, x, y, z, least = other, ox, oy, oz, value
-    return mask, x, y, z
-
-
-@compiled
-def _nearest_on_tetrahedron(s: Array) -> tuple[int, float, float, float]:
-    """Return the corners of the nearest face as bits, none if the origin is inside."""
-    mask, x, y, z, least = 0, 0.0, 0.0, 0.0, np.inf
-    for i, j, k, opposite in ((0, 1, 2, 3), (0, 1, 3, 2), (0, 2, 3, 1), (1, 2, 3, 0)):
-        if _is_outside(s, i, j, k, opposite):
-            other, ox, oy, oz = _nearest_on_triangle(s, i, j, k)
-            value = ox * ox + oy * oy + oz * oz
-            if value < least:
-                mask, x, y, z, least = other, ox, oy, oz, value
-    return mask, x, y, z
-
-
-@compiled
-def _is_outside(s: Array, i: int, j: int, k: int, opposite: int) -> bool:
-    """Return whether the origin is not on the same side of a face as the corner opposite to it."""
-    ux, uy, uz = s[j, 0] - s[i, 0], s[j, 1] - s[i, 1], s[j, 2] - s[i, 2]
-    wx, wy, wz = s[k, 0] - s[i, 0], s[k, 1] - s[i, 1], s[k, 2] - s[i, 2]
-    nx, ny, nz = uy * wz - uz * wy, uz * wx - ux * wz, ux * wy - uy * wx
-    to_origin = -(s[i, 0] * nx + s[i, 1] * ny + s[i, 2] * nz)
-    to_corner = (
-        (s[opposite, 0] - s[i, 0]) * nx
-        + (s[opposite, 1] - s[i, 1]) * ny
-        + (s[opposite, 2] - s[i, 2]) * nz
-    )
-    return bool(to_origin * to_corner <= 0.0)
+                to = simplex[j, k] - simplex[n, k] if j < n else -simplex[n, k]
+                system[i, j] += (simplex[i, k] - simplex[n, k]) * to
+    for i in range(n):
+        length = system[i, i]
+        for j in range(i):
+            share = system[i, j] / system[j, j]
+            for k in range(j, n + 1):
+                system[i, k] -= share * system[j, k]
+        if not system[i, i] > _FLAT * length:
+            return False
+    last = 1.0
+    for i in range(n - 1, -1, -1):
+        value = system[i, n]
+        for j in range(i + 1, n):
+            value -= system[i, j] * weight[j]
+        weight[i] = value / system[i, i]
+        last -= weight[i]
+    weight[n] = last
+    return True

@@ -13,6 +13,7 @@ from densarm.link_placements import joint_chain, write_placements
 
 BRANCHING = Path(__file__).parent / "data" / "branching.urdf"
 BASE = pin.SE3(pin.rpy.rpyToMatrix(0.3, -0.7, 2.0), np.array([0.4, -0.2, 0.9]))
+POSITIONS = st.tuples(*[st.floats(-4.0, 4.0)] * 7)
 ARMS = {
     "panda": lambda: load_arm("panda"),
     "branching, placed": lambda: load_arm(BRANCHING, base_placement=BASE),
@@ -24,13 +25,13 @@ def arm(request) -> Arm:
     return ARMS[request.param]()
 
 
-@given(angles=st.tuples(*[st.floats(-4.0, 4.0)] * 7))
-def test_agrees_with_pinocchio(arm, angles):
+@given(angles=POSITIONS, step=POSITIONS, share=st.floats(0.0, 1.0))
+def test_agrees_with_pinocchio(arm, angles, step, share):
     """On revolute, continuous and prismatic joints, about any axis, in a chain and in a tree."""
-    angles = np.array(angles)[: arm.nv]
-    pin.forwardKinematics(arm.model, arm.data, arm.configuration(angles))
+    angles, step = (np.array(values)[: arm.nv] for values in (angles, step))
+    pin.forwardKinematics(arm.model, arm.data, arm.configuration(angles + share * step))
     rotation, translation = (np.empty((arm.model.njoints, *shape)) for shape in ((3, 3), (3,)))
-    write_placements(joint_chain(arm.model), angles, rotation, translation)
+    write_placements(joint_chain(arm.model), angles, step, share, rotation, translation)
     for joint, expected in enumerate(arm.data.oMi):
         np.testing.assert_allclose(rotation[joint], expected.rotation, atol=1e-13)
         np.testing.assert_allclose(translation[joint], expected.translation, atol=1e-13)
