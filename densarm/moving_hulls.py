@@ -117,7 +117,7 @@ def _apart(
     """Return by how much the ball around one shape is outside the box around the other [m]."""
     one = _outside_box(rotation, translation, half_side, i, j) - ball[i]
     other = _outside_box(rotation, translation, half_side, j, i) - ball[j]
-    return float(one if one > other else other)
+    return float(max(one, other))
 
 
 @compiled
