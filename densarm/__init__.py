@@ -10,12 +10,14 @@ if TYPE_CHECKING:
     from densarm.arm import Arm, JointLimits, load_arm
     from densarm.certificates.certificate import Certificate, Check
     from densarm.clearance import Clearance, ClearanceSample
-    from densarm.closed_loop import make_controller, simulate
+    from densarm.closed_loop import make_controller, make_velocity_controller, simulate
     from densarm.control.controller import Controller
     from densarm.control.density_feedback import DensityFeedback
     from densarm.control.density_tracking import DensityTracking
     from densarm.control.field_regulation import FieldRegulation
+    from densarm.control.field_velocity import FieldVelocity
     from densarm.control.gains import Gains
+    from densarm.control.velocity_controller import VelocityController
     from densarm.density.gauge import Gauge
     from densarm.density.goal_distance import EuclideanDistance, ProductDistance, TorusDistance
     from densarm.density.navigation_density import (
@@ -49,8 +51,9 @@ if TYPE_CHECKING:
         load_scenario,
     )
     from densarm.scene import Box, Capsule, Cylinder, Scene, Sphere
-    from densarm.simulation.fixed_step_loop import SimulationParameters
+    from densarm.simulation.fixed_step_loop import FixedStepLoop, SimulationParameters
     from densarm.simulation.plant import Integrator, PinocchioPlant
+    from densarm.simulation.single_integrator import SingleIntegrator
     from densarm.swept_bound import SweptBound
     from densarm.trajectory import Trajectory
     from densarm.visualization.plots import save_plot
@@ -79,7 +82,9 @@ __all__ = [
     "DirectGuide",
     "EuclideanDistance",
     "FieldRegulation",
+    "FieldVelocity",
     "FileContentError",
+    "FixedStepLoop",
     "Gains",
     "Gauge",
     "Guide",
@@ -105,6 +110,7 @@ __all__ = [
     "Scene",
     "SensingParameters",
     "SimulationParameters",
+    "SingleIntegrator",
     "SpeedParameters",
     "Sphere",
     "SweptBound",
@@ -112,10 +118,12 @@ __all__ = [
     "TorusDistance",
     "Trajectory",
     "UnknownNameError",
+    "VelocityController",
     "__version__",
     "load_arm",
     "load_scenario",
     "make_controller",
+    "make_velocity_controller",
     "plan_motion",
     "save_html",
     "save_plot",
@@ -131,7 +139,9 @@ _NAMES = {
     "control.density_feedback": ("DensityFeedback",),
     "control.density_tracking": ("DensityTracking",),
     "control.field_regulation": ("FieldRegulation",),
+    "control.field_velocity": ("FieldVelocity",),
     "control.gains": ("Gains",),
+    "control.velocity_controller": ("VelocityController",),
     "density.gauge": ("Gauge",),
     "density.goal_distance": ("EuclideanDistance", "ProductDistance", "TorusDistance"),
     "density.navigation_density": ("DensityParameters", "DensitySample", "NavigationDensity"),
@@ -155,9 +165,10 @@ _NAMES = {
     "robot_description": ("RobotDescription",),
     "scenario": ("ControlForm", "ControlParameters", "GuideKind", "Scenario", "load_scenario"),
     "scene": ("Box", "Capsule", "Cylinder", "Scene", "Sphere"),
-    "closed_loop": ("make_controller", "simulate"),
-    "simulation.fixed_step_loop": ("SimulationParameters",),
+    "closed_loop": ("make_controller", "make_velocity_controller", "simulate"),
+    "simulation.fixed_step_loop": ("FixedStepLoop", "SimulationParameters"),
     "simulation.plant": ("Integrator", "PinocchioPlant"),
+    "simulation.single_integrator": ("SingleIntegrator",),
     "swept_bound": ("SweptBound",),
     "trajectory": ("Trajectory",),
     "visualization.plots": ("save_plot",),

@@ -13,6 +13,8 @@ from densarm.control.controller import Controller
 from densarm.control.density_feedback import DensityFeedback
 from densarm.control.density_tracking import DensityTracking
 from densarm.control.field_regulation import FieldRegulation
+from densarm.control.field_velocity import FieldVelocity
+from densarm.control.velocity_controller import VelocityController
 from densarm.fields.density_field import DensityField
 from densarm.fields.speed_law import SpeedLaw
 from densarm.guides.guide import Guide, NoPath
@@ -23,6 +25,7 @@ from densarm.reference.reference import Reference
 from densarm.reference.reference_density import reference_density
 from densarm.scenario import ControlForm, GuideKind, Scenario
 from densarm.simulation.fixed_step_loop import FixedStepLoop, LoopEnd, Recording
+from densarm.simulation.plant import PinocchioPlant
 from densarm.trajectory import Trajectory
 from densarm.validation import one_of
 
@@ -125,10 +128,24 @@ def make_controller(scenario: Scenario, plan: MotionPlan) -> Controller:
             plan.bound, plan.reference, scenario.sensing, scenario.density, scenario.control.kappa
         )
         return DensityTracking(arm, density, plan.reference, scenario.gains)
-    field = DensityField(plan.guided, SpeedLaw(plan.bound, scenario.speed), scenario.gains.rate)
+    field = _field(scenario, plan)
     if scenario.control.form == ControlForm.REGULATION:
         return FieldRegulation(arm, field, scenario.gains, period)
     return DensityFeedback(arm, field, scenario.gains, period)
+
+
+def make_velocity_controller(scenario: Scenario, plan: MotionPlan) -> VelocityController:
+    """Return the planning system of a plan, for a plant that takes velocities.
+
+    Args:
+        scenario: speed law, and gains, whose K_p / K_v is the rate λ of `DensityField`.
+        plan: the way that it drives the arm along.
+    """
+    return FieldVelocity(scenario.arm, _field(scenario, plan))
+
+
+def _field(scenario: Scenario, plan: MotionPlan) -> DensityField:
+    return DensityField(plan.guided, SpeedLaw(plan.bound, scenario.speed), scenario.gains.rate)
 
 
 def _run(
@@ -138,7 +155,9 @@ def _run(
     plan_time: float,
     on_progress: OnProgress,
 ) -> Trajectory:
-    recording = FixedStepLoop(scenario.arm, scenario.simulation).run(
+    arm, simulation = scenario.arm, scenario.simulation
+    plant = PinocchioPlant(arm, simulation.dt, simulation.integrator)
+    recording = FixedStepLoop(arm, plant, simulation).run(
         drive.controller,
         scenario.start,
         scenario.goal,
@@ -159,7 +178,7 @@ def _run(
         time=recording.time[:last],
         q=recording.q[:last],
         v=recording.v[:last],
-        tau=recording.tau[np.minimum(np.arange(last), max(last - 2, 0))],
+        tau=recording.u[np.minimum(np.arange(last), max(last - 2, 0))],
         clearance=smallest[:last],
         outcome=outcome,
         detail=detail,

@@ -21,6 +21,7 @@ LAYERS = (
         "bisection",
         "captured_stderr",
         "compiled",
+        "configuration_space",
         "errors",
         "outcome",
         "tables",

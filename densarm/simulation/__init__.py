@@ -7,6 +7,7 @@ from densarm.simulation.fixed_step_loop import (
     SimulationParameters,
 )
 from densarm.simulation.plant import Integrator, PinocchioPlant, Plant
+from densarm.simulation.single_integrator import SingleIntegrator
 
 __all__ = [
     "FixedStepLoop",
@@ -16,4 +17,5 @@ __all__ = [
     "Plant",
     "Recording",
     "SimulationParameters",
+    "SingleIntegrator",
 ]

@@ -3,14 +3,14 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum, auto
+from typing import Generic
 
 import numpy as np
 
-from densarm.arm import Arm
 from densarm.arrays import Array
-from densarm.control.controller import Controller
+from densarm.configuration_space import ConfigurationSpace
 from densarm.errors import InvalidValueError
-from densarm.simulation.plant import Integrator, PinocchioPlant
+from densarm.simulation.plant import C_contra, Integrator, Plant
 from densarm.validation import one_of, positive, positive_integer
 
 REACHED_POSITION = 0.01
@@ -34,9 +34,9 @@ class SimulationParameters:
     dt: float = 0.001
     """Time step of the plant [s]."""
     integrator: Integrator = Integrator.SEMI_IMPLICIT_EULER
-    """How the plant is stepped."""
+    """How the dynamics are stepped."""
     control_divisor: int = 1
-    """Plant steps per controller call; the torque is held between."""
+    """Plant steps per controller call; its input is held between."""
     time_limit: float = 60.0
     """Simulated time after which the run ends [s]."""
     hold_time: float = 0.1
@@ -78,27 +78,35 @@ class Recording:
     """Configurations (N, nq)."""
     v: Array
     """Velocities (N, nv) [rad/s or m/s]."""
-    tau: Array
-    """Torque held from each sample to the next (N, nv) [N·m or N]; the last row repeats."""
+    u: Array
+    """Input of the plant held from each sample to the next (N, nv); the last row repeats."""
     end: LoopEnd
 
 
-class FixedStepLoop:
-    """Runs a controller on a simulated arm until the goal is held, the arm stalls, or time is up.
+class FixedStepLoop(Generic[C_contra]):
+    """Runs a controller on a plant until the goal is held, the motion stalls, or time is up.
 
     Args:
-        arm: the arm.
-        parameters: time step, integrator and limits of time.
+        space: where the motion takes place: the arm, or Rⁿ.
+        plant: what is driven.
+        parameters: time step and limits of time.
+
+    Raises:
+        InvalidValueError: a plant with another time step.
     """
 
-    def __init__(self, arm: Arm, parameters: SimulationParameters) -> None:
-        self._arm = arm
+    def __init__(
+        self, space: ConfigurationSpace, plant: Plant[C_contra], parameters: SimulationParameters
+    ) -> None:
+        if plant.dt != parameters.dt:
+            raise InvalidValueError("dt of the plant", plant.dt, f"the loop's, {parameters.dt}")
+        self._space = space
+        self._plant = plant
         self._parameters = parameters
-        self._plant = PinocchioPlant(arm, parameters.dt, parameters.integrator)
 
     def run(
         self,
-        controller: Controller,
+        controller: C_contra,
         start: Array,
         goal: Array,
         not_before: float = 0.0,
@@ -113,16 +121,16 @@ class FixedStepLoop:
             not_before: time [s] until which standing still is no stall.
             on_progress: told the simulated time [s] now and then.
         """
-        p, q, v = self._parameters, start, np.zeros(self._arm.nv)
+        p, q, v = self._parameters, start, np.zeros(self._space.nv)
         held, end = 0, LoopEnd.TIMED_OUT
         rest, rested_since = q, 0
-        states, torques = [(q, v)], []
+        states, inputs = [(q, v)], []
         for k in range(round(p.time_limit / p.dt)):
             if k % p.control_divisor == 0:
-                tau = controller.torque(k * p.dt, q, v)
-            q, v = self._plant.step(q, v, tau)
+                u = self._plant.control(controller, k * p.dt, q, v)
+            q, v = self._plant.step(q, v, u)
             states.append((q, v))
-            torques.append(tau)
+            inputs.append(u)
             held = held + 1 if self._is_at_goal(q, v, goal) else 0
             if k * p.dt <= not_before or self._error(q, rest) > _STALL_MOTION:
                 rest, rested_since = q, k
@@ -134,12 +142,12 @@ class FixedStepLoop:
                 break
             if k % _PROGRESS_INTERVAL == 0:
                 on_progress(k * p.dt)
-        torques.append(torques[-1])
+        inputs.append(inputs[-1])
         return Recording(
             time=p.dt * np.arange(len(states), dtype=np.float64),
             q=np.array([state[0] for state in states]),
             v=np.array([state[1] for state in states]),
-            tau=np.array(torques),
+            u=np.array(inputs),
             end=end,
         )
 
@@ -150,4 +158,4 @@ class FixedStepLoop:
 
     def _error(self, q_a: Array, q_b: Array) -> float:
         """Return the largest difference of a joint [rad or m]."""
-        return float(np.abs(self._arm.difference(q_a, q_b)).max())
+        return float(np.abs(self._space.difference(q_a, q_b)).max())

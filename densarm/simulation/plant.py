@@ -1,12 +1,15 @@
-"""Plant: the simulated arm, stepped by a named integrator."""
+"""Plant: what a controller drives, and the arm by its forward dynamics."""
 
 from enum import StrEnum
-from typing import Protocol
+from typing import Protocol, TypeVar
 
 import pinocchio as pin
 
 from densarm.arm import Arm
 from densarm.arrays import Array
+from densarm.control.controller import Controller
+
+C_contra = TypeVar("C_contra", contravariant=True)
 
 
 class Integrator(StrEnum):
@@ -18,22 +21,31 @@ class Integrator(StrEnum):
     """The classical Runge-Kutta method of order four, torque held."""
 
 
-class Plant(Protocol):
-    """A torque-driven arm."""
+class Plant(Protocol[C_contra]):
+    """A simulated system, driven by the input that controllers of one kind supply."""
 
-    def step(self, q: Array, v: Array, tau: Array) -> tuple[Array, Array]:
+    @property
+    def dt(self) -> float:
+        """Time step [s]."""
+        ...
+
+    def control(self, controller: C_contra, t: float, q: Array, v: Array) -> Array:
+        """Return the input u (nv,) that a controller chooses at a time [s] and state."""
+        ...
+
+    def step(self, q: Array, v: Array, u: Array) -> tuple[Array, Array]:
         """Return the state one time step later.
 
         Args:
             q: configuration (nq,).
             v: velocity (nv,) [rad/s or m/s].
-            tau: torque held during the step (nv,) [N·m or N].
+            u: input held during the step (nv,).
         """
         ...
 
 
 class PinocchioPlant:
-    r"""Forward dynamics by the articulated-body algorithm.
+    r"""A `Plant` whose input is torque: forward dynamics by the articulated-body algorithm.
 
     .. math:: \ddot q = M(q)^{-1} (\tau - H(q, \dot q))
 
@@ -48,26 +60,30 @@ class PinocchioPlant:
     def __init__(self, arm: Arm, dt: float, integrator: Integrator) -> None:
         self._model = arm.model
         self._data = arm.model.createData()
-        self._dt = dt
+        self.dt = dt
         self._advance = {
             Integrator.SEMI_IMPLICIT_EULER: self._semi_implicit_euler,
             Integrator.RK4: self._rk4,
         }[integrator]
 
-    def step(self, q: Array, v: Array, tau: Array) -> tuple[Array, Array]:
-        """Act as `Plant.step`."""
-        return self._advance(q, v, tau)
+    def control(self, controller: Controller, t: float, q: Array, v: Array) -> Array:
+        """Return the torque (nv,) [N·m or N], as `Plant.control`."""
+        return controller.torque(t, q, v)
+
+    def step(self, q: Array, v: Array, u: Array) -> tuple[Array, Array]:
+        """Act as `Plant.step`, u the torque [N·m or N]."""
+        return self._advance(q, v, u)
 
     def acceleration(self, q: Array, v: Array, tau: Array) -> Array:
         """Return the acceleration (nv,) [rad/s²] of a torque, overwritten by the next call."""
         return pin.aba(self._model, self._data, q, v, tau)  # type: ignore[no-any-return]
 
     def _semi_implicit_euler(self, q: Array, v: Array, tau: Array) -> tuple[Array, Array]:
-        v = v + self._dt * self.acceleration(q, v, tau)
-        return pin.integrate(self._model, q, self._dt * v), v
+        v = v + self.dt * self.acceleration(q, v, tau)
+        return pin.integrate(self._model, q, self.dt * v), v
 
     def _rk4(self, q: Array, v: Array, tau: Array) -> tuple[Array, Array]:
-        dt, model = self._dt, self._model
+        dt, model = self.dt, self._model
         a1 = self.acceleration(q, v, tau).copy()
         v2 = v + 0.5 * dt * a1
         a2 = self.acceleration(pin.integrate(model, q, 0.5 * dt * v), v2, tau).copy()

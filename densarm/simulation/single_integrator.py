@@ -1,16 +1,12 @@
-"""SingleIntegrator: a point of Rⁿ whose velocity is the control, with noise."""
+"""SingleIntegrator: a plant that moves with the velocity it is told, and with noise."""
 
-from dataclasses import dataclass
 from enum import StrEnum
 
 import numpy as np
-from numpy.typing import NDArray
 
 from densarm.arrays import Array
-from densarm.density.implicit_function import smallest_value
-from densarm.fields.navigation_field import NavigationField
-from densarm.fields.saturation import saturate
-from densarm.outcome import Outcome
+from densarm.configuration_space import ConfigurationSpace
+from densarm.control.velocity_controller import VelocityController
 from densarm.validation import non_negative, one_of, positive
 
 
@@ -26,11 +22,14 @@ class NoiseScaling(StrEnum):
 
 
 class SingleIntegrator:
-    r"""A `Plant` whose control is a velocity: ẋ = u + w.
+    r"""A `Plant` whose input is a velocity: q̇ = u + w.
 
-    .. math:: x^+ = x + \Delta t\,(u + w)
+    .. math:: q^+ = q \oplus \Delta t\,(u + w)
+
+    Under noise the velocity never settles, so that `FixedStepLoop` calls no goal reached.
 
     Args:
+        space: of q: the joint space of an arm, or Rⁿ.
         dt: Δt [s].
         noise: variance Σ ≥ 0 of each component of w, in the unit of its scaling.
         scaling: see `NoiseScaling`.
@@ -44,88 +43,30 @@ class SingleIntegrator:
 
     def __init__(
         self,
+        space: ConfigurationSpace,
         dt: float,
         noise: float = 0.0,
         scaling: NoiseScaling = NoiseScaling.WHITE,
         seed: int = 0,
     ) -> None:
+        self._space = space
         self.dt = positive("dt", dt)
         one_of("scaling", scaling, list(NoiseScaling))
         power = 1.0 if scaling == NoiseScaling.HELD else 1.0 / dt
         self._deviation = np.sqrt(non_negative("noise", noise) * power)
         self._random = np.random.default_rng(seed)
 
-    def step(self, q: Array, v: Array, tau: Array) -> tuple[Array, Array]:
-        """Return position and velocity one time step later, as `Plant.step`.
+    def control(self, controller: VelocityController, t: float, q: Array, v: Array) -> Array:
+        """Return the commanded velocity (nv,) [rad/s or m/s], as `Plant.control`."""
+        return controller.velocity(t, q, v)
+
+    def step(self, q: Array, v: Array, u: Array) -> tuple[Array, Array]:
+        """Return configurations and velocities one time step later, as `Plant.step`.
 
         Args:
-            q: positions (..., n) [m].
-            v: velocities (..., n) [m/s], which do not matter.
-            tau: control u (..., n) [m/s].
+            q: configurations (..., nq).
+            v: velocities (..., nv) [rad/s or m/s], which do not matter.
+            u: commanded velocities (..., nv) [rad/s or m/s].
         """
-        velocity = tau + self._deviation * self._random.standard_normal(v.shape)
-        return q + self.dt * velocity, velocity
-
-
-@dataclass(frozen=True)
-class PointRuns:
-    """Runs of many points side by side; a point that ended stays where it is, with u = 0."""
-
-    time: Array
-    """k Δt (K,) [s]."""
-    x: Array
-    """Positions (K, N, n) [m]."""
-    u: Array
-    """Controls held from each sample to the next (K, N, n) [m/s]; the last is zero."""
-    outcome: NDArray[np.str_]
-    """The word of an `Outcome` (N,): reached, collided or timed_out."""
-
-    def count(self, outcome: Outcome) -> int:
-        """Return the number of runs with an outcome."""
-        return int(np.count_nonzero(self.outcome == outcome))
-
-
-def run_points(
-    field: NavigationField,
-    plant: SingleIntegrator,
-    starts: Array,
-    u_max: float,
-    time_limit: float,
-    reach_radius: float,
-    gain: float = 1.0,
-) -> PointRuns:
-    """Run u = gain · k(x), saturated, on many single integrators until each has ended.
-
-    Args:
-        field: k, the goal and the obstacles.
-        plant: what is stepped.
-        starts: shape (N, n) [m].
-        u_max: bound of each component of u [m/s]; infinity for none.
-        time_limit: time after which a run ends [s].
-        reach_radius: distance from the goal at which a run has reached it [m].
-        gain: factor > 0 of the field before the bound, [m/s] per unit of k.
-
-    Returns:
-        All samples of all runs. The first of reaching the goal and entering an obstacle counts.
-    """
-    x, v = np.array(starts, np.float64), np.zeros_like(starts, np.float64)
-    outcome = np.full(len(x), Outcome.TIMED_OUT, dtype="U10")
-    active = np.ones(len(x), dtype=bool)
-    positions, controls = [], []
-    for _ in range(round(time_limit / plant.dt) + 1):
-        positions.append(x)
-        reached = np.linalg.norm(x - field.goal, axis=-1) <= reach_radius
-        outcome[active & reached] = Outcome.REACHED
-        outcome[active & (smallest_value(field.obstacles, x) <= 0.0)] = Outcome.COLLIDED
-        active &= outcome == Outcome.TIMED_OUT
-        u = np.zeros_like(x)
-        if active.any():
-            u[active] = saturate(gain * field.direction(x[active]), u_max)
-        controls.append(u)
-        if not active.any():
-            break
-        stepped, v = plant.step(x, v, u)
-        x = np.where(active[:, np.newaxis], stepped, x)
-    controls[-1] = np.zeros_like(x)
-    time: Array = plant.dt * np.arange(len(positions), dtype=np.float64)
-    return PointRuns(time, np.array(positions), np.array(controls), outcome)
+        velocity = u + self._deviation * self._random.standard_normal(v.shape)
+        return self._space.integrate(q, self.dt * velocity), velocity

@@ -4,14 +4,16 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from densarm.arrays import Array
+from densarm.configuration_space import EuclideanSpace
 from densarm.density.euclidean_density import EuclideanDensity
 from densarm.density.gauge import Gauge
 from densarm.density.implicit_function import Placed, UnsafeRegion, smallest_value
 from densarm.density.implicit_shapes import Ball
 from densarm.density.navigation_density import DensityParameters
 from densarm.outcome import Outcome
+from densarm.simulation.point_runs import PointRuns, run_points
 from densarm.simulation.proportion import Proportion
-from densarm.simulation.single_integrator import PointRuns, SingleIntegrator, run_points
+from densarm.simulation.single_integrator import SingleIntegrator
 from densarm.visualization import figure_style as style
 from densarm.visualization.figure_report import FigureReport, figure_arguments
 
@@ -70,8 +72,9 @@ def draw(runs: PointRuns, starts: Array) -> Figure:
 def main(arguments: list[str] | None = None) -> None:
     options = figure_arguments(__doc__, starts=1000, arguments=arguments)
     starts = random_starts(options.starts)
+    plant = SingleIntegrator(EuclideanSpace(2), DT)
     runs, plain = (
-        run_points(FIELD, SingleIntegrator(DT), starts, U_MAX, TIME_LIMIT, REACH_RADIUS, gain)
+        run_points(FIELD, plant, starts, U_MAX, TIME_LIMIT, REACH_RADIUS, gain)
         for gain in (GAIN, 1.0)
     )
     style.save_figure(draw(runs, starts), options.out, "fig6_bounded_control")

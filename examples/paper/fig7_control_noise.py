@@ -6,19 +6,16 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from densarm.arrays import Array
+from densarm.configuration_space import EuclideanSpace
 from densarm.density.euclidean_density import EuclideanDensity
 from densarm.density.gauge import Gauge
 from densarm.density.implicit_function import Placed, UnsafeRegion, smallest_value
 from densarm.density.implicit_shapes import Ball
 from densarm.density.navigation_density import DensityParameters
 from densarm.outcome import Outcome
+from densarm.simulation.point_runs import PointRuns, run_points
 from densarm.simulation.proportion import Proportion
-from densarm.simulation.single_integrator import (
-    NoiseScaling,
-    PointRuns,
-    SingleIntegrator,
-    run_points,
-)
+from densarm.simulation.single_integrator import NoiseScaling, SingleIntegrator
 from densarm.visualization import figure_style as style
 from densarm.visualization.figure_report import FigureReport, figure_arguments
 
@@ -49,7 +46,7 @@ def random_starts(count: int) -> Array:
 
 
 def run(gauge: Gauge, scaling: NoiseScaling, variance: float, starts: Array) -> PointRuns:
-    plant = SingleIntegrator(DT, variance, scaling, seed=7)
+    plant = SingleIntegrator(EuclideanSpace(2), DT, variance, scaling, seed=7)
     return run_points(field(gauge), plant, starts, U_MAX, TIME_LIMIT, REACH_RADIUS, GAIN)
 
 

@@ -28,7 +28,13 @@ from densarm.outcome import Outcome
 from densarm.reference.smooth_path import smooth_path
 from densarm.reference.timing import time_path
 from densarm.reference.timing_parameters import TimingParameters
-from densarm.simulation import FixedStepLoop, LoopEnd, Recording, SimulationParameters
+from densarm.simulation import (
+    FixedStepLoop,
+    LoopEnd,
+    PinocchioPlant,
+    Recording,
+    SimulationParameters,
+)
 from densarm.simulation.proportion import Proportion
 from densarm.swept_bound import SweptBound
 from densarm.swept_check import SweptCheck, SweptVerdict
@@ -113,7 +119,8 @@ def run_by_torque(unsafe: UnsafeSet, path: Array) -> Recording:
     reference = time_path(arm, smooth, length, simulation.control_period, TimingParameters())
     density = NavigationDensity([unsafe], sum_distance(inertia_weights()))
     controller = DensityTracking(arm, density, reference, GAINS)
-    return FixedStepLoop(arm, simulation).run(
+    plant = PinocchioPlant(arm, simulation.dt, simulation.integrator)
+    return FixedStepLoop(arm, plant, simulation).run(
         controller, configurations[0], goal, not_before=reference.duration
     )
 
@@ -154,7 +161,7 @@ def draw_traces(axes: list[Axes], run: Recording) -> None:
     rows = (
         (np.unwrap(arm.angles(run.q), axis=0), np.array([np.inf, np.inf]), "$q$ [rad]"),
         (run.v, arm.limits.velocity, "$\\dot q$ [rad/s]"),
-        (run.tau, arm.limits.effort, "$u$ [N·m]"),
+        (run.u, arm.limits.effort, "$u$ [N·m]"),
     )
     for ax, (values, limit, label) in zip(axes, rows, strict=True):
         for j, colour in enumerate(colours):
@@ -269,7 +276,7 @@ def main(arguments: list[str] | None = None) -> None:
     clear = [smallest_clearance(each) for each in (run, *runs)]
     proved = [is_proved_clear(each) for each in (run, *runs)]
     held = [each.end is LoopEnd.REACHED for each in (run, *runs)]
-    ratio = max(float((np.abs(each.tau) / arm.limits.effort).max()) for each in (run, *runs))
+    ratio = max(float((np.abs(each.u) / arm.limits.effort).max()) for each in (run, *runs))
     bump = ClearanceSet(clearance, 0.0, SIGMA)
     FigureReport(
         "Fig. 8",

@@ -1,27 +1,19 @@
+from pathlib import Path
+
 import numpy as np
 import pytest
 
-from densarm.density.euclidean_density import EuclideanDensity
-from densarm.density.gauge import Gauge
-from densarm.density.implicit_function import UnsafeRegion
-from densarm.density.implicit_shapes import Ball
-from densarm.density.navigation_density import DensityParameters
+from densarm.arm import load_arm
+from densarm.configuration_space import EuclideanSpace
 from densarm.errors import InvalidValueError
-from densarm.fields.potential_field import PotentialField
-from densarm.outcome import Outcome
-from densarm.simulation.single_integrator import NoiseScaling, SingleIntegrator, run_points
+from densarm.simulation.single_integrator import NoiseScaling, SingleIntegrator
 
-GOAL = np.array([3.0, 0.0])
-
-
-def field(theta=0.0):
-    region = UnsafeRegion(Ball(1.0), Ball(2.0))
-    parameters = DensityParameters(theta=theta, gauge=Gauge.LOG, blend_radius=0.2)
-    return EuclideanDensity([region], GOAL, parameters)
+PLANE = EuclideanSpace(2)
+BRANCHING = Path(__file__).parents[1] / "data" / "branching.urdf"
 
 
 def test_moves_by_the_control():
-    x, v = SingleIntegrator(0.1).step(np.ones(2), np.zeros(2), np.array([1.0, -2.0]))
+    x, v = SingleIntegrator(PLANE, 0.1).step(np.ones(2), np.zeros(2), np.array([1.0, -2.0]))
     np.testing.assert_allclose(x, [1.1, 0.8])
     np.testing.assert_array_equal(v, [1.0, -2.0])
 
@@ -30,7 +22,7 @@ def test_moves_by_the_control():
     ("scaling", "variance"), [(NoiseScaling.HELD, 4e-6), (NoiseScaling.WHITE, 4e-4)]
 )
 def test_variance_of_a_step_follows_the_scaling(scaling, variance):
-    plant = SingleIntegrator(0.01, 0.04, scaling)
+    plant = SingleIntegrator(PLANE, 0.01, 0.04, scaling)
     zero = np.zeros((100_000, 2))
     x, _ = plant.step(zero, zero, zero)
     assert x.var() == pytest.approx(variance, rel=0.02)
@@ -39,49 +31,28 @@ def test_variance_of_a_step_follows_the_scaling(scaling, variance):
 
 def test_same_seed_same_noise():
     zero = np.zeros(3)
-    runs = [SingleIntegrator(0.1, 1.0, seed=seed).step(zero, zero, zero)[0] for seed in (5, 5, 6)]
+    plants = [SingleIntegrator(EuclideanSpace(3), 0.1, 1.0, seed=seed) for seed in (5, 5, 6)]
+    runs = [plant.step(zero, zero, zero)[0] for plant in plants]
     np.testing.assert_array_equal(runs[0], runs[1])
     assert (runs[0] != runs[2]).all()
 
 
-def test_runs_stay_within_the_bound_and_reach():
-    starts = np.array([[-3.0, 0.5], [0.0, 3.0], [2.0, -2.0]])
-    runs = run_points(field(), SingleIntegrator(0.02), starts, 0.5, 60.0, 0.01)
-    assert runs.count(Outcome.REACHED) == 3
-    assert np.abs(runs.u).max() <= 0.5 * (1.0 + 1e-12)
-    np.testing.assert_array_equal(runs.x[0], starts)
-    np.testing.assert_allclose(runs.x[1:] - runs.x[:-1], 0.02 * runs.u[:-1], atol=1e-12)
-    assert len(runs.time) == len(runs.x) == len(runs.u)
-    np.testing.assert_array_equal(runs.u[-1], 0.0)
-
-
-def test_a_run_that_ended_stays_where_it_is():
-    starts = GOAL + np.array([[0.5, 0.0], [-6.0, 0.5]])
-    runs = run_points(field(), SingleIntegrator(0.02, 1e-4), starts, 0.5, 60.0, 0.05)
-    still = np.flatnonzero(np.linalg.norm(runs.x[:, 0] - GOAL, axis=1) <= 0.05)
-    np.testing.assert_array_equal(runs.x[still, 0], np.tile(runs.x[still[0], 0], (len(still), 1)))
-
-
-def test_entering_an_obstacle_and_the_time_limit_are_outcomes():
-    blind = PotentialField([Ball(1.0)], GOAL, influence=1e-6)
-    starts = np.array([[-2.0, 0.0], [2.0, 3.0]])
-    runs = run_points(blind, SingleIntegrator(0.01), starts, 1.0, 1.5, 0.01)
-    assert list(runs.outcome) == [Outcome.COLLIDED, Outcome.TIMED_OUT]
-
-
-def test_the_gain_speeds_up():
-    start = np.array([[-3.0, 0.5]])
-    slow, fast = (
-        run_points(field(), SingleIntegrator(0.01), start, np.inf, 120.0, 0.05, gain)
-        for gain in (1.0, 3.0)
-    )
-    assert fast.time[-1] < slow.time[-1]
+def test_moves_an_arm_within_its_joint_space():
+    arm = load_arm(BRANCHING)  # with a continuous joint
+    plant = SingleIntegrator(arm, 0.1)
+    q, u = arm.configuration(np.full(arm.nv, 0.3)), np.linspace(-1.0, 1.0, arm.nv)
+    start, turned = q, np.zeros(arm.nv)
+    for _ in range(50):
+        q, v = plant.step(q, turned, u)
+    arm.check_configuration("q", q)
+    np.testing.assert_array_equal(v, u)
+    np.testing.assert_allclose(arm.difference(arm.integrate(start, 5.0 * u), q), 0.0, atol=1e-12)
 
 
 def test_values_out_of_range_are_refused():
     with pytest.raises(InvalidValueError, match="dt"):
-        SingleIntegrator(0.0)
+        SingleIntegrator(PLANE, 0.0)
     with pytest.raises(InvalidValueError, match="scaling"):
-        SingleIntegrator(0.1, 1.0, "pink")
+        SingleIntegrator(PLANE, 0.1, 1.0, "pink")
     with pytest.raises(InvalidValueError, match="noise"):
-        SingleIntegrator(0.1, -1.0)
+        SingleIntegrator(PLANE, 0.1, -1.0)
