@@ -42,6 +42,7 @@ if TYPE_CHECKING:
     from densarm.outcome import Outcome
     from densarm.reference.reference import Reference
     from densarm.reference.timing_parameters import TimingParameters
+    from densarm.rigid_body import Freedom, free_body
     from densarm.robot_description import RobotDescription
     from densarm.scenario import (
         ControlForm,
@@ -55,6 +56,7 @@ if TYPE_CHECKING:
     from densarm.simulation.plant import Integrator, PinocchioPlant
     from densarm.simulation.single_integrator import SingleIntegrator
     from densarm.swept_bound import SweptBound
+    from densarm.swept_check import SweptCheck
     from densarm.trajectory import Trajectory
     from densarm.visualization.plots import save_plot
     from densarm.visualization.view import save_html, view
@@ -85,6 +87,7 @@ __all__ = [
     "FieldVelocity",
     "FileContentError",
     "FixedStepLoop",
+    "Freedom",
     "Gains",
     "Gauge",
     "Guide",
@@ -114,12 +117,14 @@ __all__ = [
     "SpeedParameters",
     "Sphere",
     "SweptBound",
+    "SweptCheck",
     "TimingParameters",
     "TorusDistance",
     "Trajectory",
     "UnknownNameError",
     "VelocityController",
     "__version__",
+    "free_body",
     "load_arm",
     "load_scenario",
     "make_controller",
@@ -155,6 +160,7 @@ _NAMES = {
     ),
     "fields.speed_law": ("SpeedParameters",),
     "fields.sub_goal_chain": ("SensingParameters",),
+    "rigid_body": ("Freedom", "free_body"),
     "guides.direct": ("DirectGuide",),
     "guides.guide": ("Guide", "GuidePath", "NoPath"),
     "guides.path": ("PathGuide", "PathGuideParameters"),
@@ -170,6 +176,7 @@ _NAMES = {
     "simulation.plant": ("Integrator", "PinocchioPlant"),
     "simulation.single_integrator": ("SingleIntegrator",),
     "swept_bound": ("SweptBound",),
+    "swept_check": ("SweptCheck",),
     "trajectory": ("Trajectory",),
     "visualization.plots": ("save_plot",),
     "visualization.view": ("save_html", "view"),

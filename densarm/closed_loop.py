@@ -138,7 +138,8 @@ def make_velocity_controller(scenario: Scenario, plan: MotionPlan) -> VelocityCo
     """Return the planning system of a plan, for a plant that takes velocities.
 
     Args:
-        scenario: speed law, and gains, whose K_p / K_v is the rate λ of `DensityField`.
+        scenario: speed law, and gains, whose K_p / K_v is the rate λ of `DensityField`. Its form
+            should not be "plain", which weighs joints by inertia.
         plan: the way that it drives the arm along.
     """
     return FieldVelocity(scenario.arm, _field(scenario, plan))

@@ -33,6 +33,7 @@ LAYERS = (
     ("robot_models",),
     ("joint_limits", "arm"),
     ("scene",),
+    ("rigid_body",),
     ("distance_view", "clearance"),
     ("link_placements", "separation"),
     ("moving_hulls",),

@@ -13,7 +13,7 @@ def run_example(monkeypatch: pytest.MonkeyPatch, name: str, *arguments: str) -> 
 
 def test_every_example_is_tested():
     names = {path.name for path in EXAMPLES.glob("*.py")}
-    assert names == {"swing_up.py", "panda_table.py", "own_control_loop.py"}
+    assert names == {"swing_up.py", "panda_table.py", "own_control_loop.py", "free_body.py"}
 
 
 def test_swing_up(monkeypatch, tmp_path, capsys):
@@ -40,3 +40,13 @@ def test_own_control_loop(monkeypatch, tmp_path, capsys):
     assert float(words[0]) < 0.01  # [rad] from the goal
     assert float(words[-2]) > 0.0  # [mm] of clearance
     assert list(tmp_path.iterdir()) == []
+
+
+def test_free_body(monkeypatch, tmp_path, capsys):
+    run_example(monkeypatch, "free_body.py", "--out", str(tmp_path))
+    out = capsys.readouterr().out
+    assert "by velocity: reached" in out
+    assert "clear\n" in out
+    assert "certified: True" in out
+    assert {path.name for path in tmp_path.iterdir()} == {"free_body.html"}
+    assert len((EXAMPLES / "free_body.py").read_text(encoding="utf-8").splitlines()) < 60

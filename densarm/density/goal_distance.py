@@ -90,6 +90,12 @@ class TorusDistance:
 
     κ = ∞ is the sum of the cᵢ; κⁿ⁻¹V_κ tends to their product as κ tends to 0.
 
+    Where metres and radians mix, weights of one count 1 m as 1 rad. In the reciprocal gauge a joint
+    settles at a rate in proportion to wᵢ, so that ones let slides and turns settle together; with
+    small weights on turns a long body comes late to the angle that it passes at. κ compares with
+    cᵢ: farther away than √(2κ/wᵢ) a joint is pulled less the farther it is, and only κ = ∞ leads
+    straight through free space.
+
     Args:
         arm: its `nq`, `idx_q` and `is_circle` are read.
         goal: configuration, shape (nq,).
