@@ -209,6 +209,22 @@ def test_by_force_the_run_is_certified_and_rebuilt_from_its_file(through_the_gap
     assert again.certified
 
 
+def test_torque_turns_a_body_through_gimbal_lock(rigid_body):
+    run = densarm.simulate(
+        densarm.Scenario(
+            name="lock",
+            title="Pitch over",
+            arm=rigid_body,
+            scene=densarm.Scene(),
+            start=rigid_body.configuration(np.zeros(6)),
+            goal=rigid_body.configuration([0.0, 0.3, 0.0, 0.3, np.pi, -0.2]),
+            simulation=SimulationParameters(dt=0.005),
+        )
+    )
+    assert run.outcome == densarm.Outcome.REACHED
+    assert run.certified
+
+
 class Blind:
     def velocity(self, t, q, v):  # noqa: ARG002
         return np.array([1.0, 0.0])

@@ -23,7 +23,7 @@ _SKY, _HORIZON = [1.0, 1.0, 1.0], [0.86, 0.89, 0.92]
 
 _LIGHTS = {"AmbientLight": 0.5, "FillLight": 0.3}  # meshcat's own values bleach light colours
 _FLOOR_CELL = 0.25  # [m]
-_PATH_RADIUS = 0.005  # of the drawn end-effector path, as a part of the arm's extent
+_PATH_RADIUS = 0.005  # of the drawn end-effector path, as a part of its and the arm's extent
 _SURROUNDINGS = 0.75  # seen around the motion where obstacles stand, as a part of its extent
 _VIEWED_SAMPLES = 60  # configurations of a motion that the camera is placed for
 
@@ -77,8 +77,10 @@ class MeshcatPlayer:
             q: (N, nq) configurations along the motion. A motion that moves the end effector by
                 less than the line's width draws nothing.
         """
-        radius = _PATH_RADIUS * float(np.ptp(self._bodies.corners(self._poses(q[0])), axis=0).max())
-        points = _spaced(np.array([self._end_effector(row) for row in q]), radius)
+        points = np.array([self._end_effector(row) for row in q])
+        drawn = np.vstack([points, self._bodies.corners(self._poses(q[0]))])
+        radius = _PATH_RADIUS * float(np.ptp(drawn, axis=0).max())
+        points = _spaced(points, radius)
         if len(points) > 1:
             material = meshcat.geometry.MeshBasicMaterial(color=_PATH_COLOR)
             self.viewer["path"].set_object(Tube(points, radius), material)

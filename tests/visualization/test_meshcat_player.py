@@ -9,6 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from densarm.arm import Arm, load_arm
+from densarm.rigid_body import free_body
 from densarm.robot_description import RobotDescription
 from densarm.scene import Scene, Sphere
 from densarm.visualization.meshcat_player import MeshcatPlayer
@@ -131,6 +132,14 @@ def test_path_follows_the_end_effector(two_link: Arm) -> None:
     curve = np.array(window.drawn()["/meshcat/path"]["geometries"][0]["path"]["points"])
     np.testing.assert_allclose(np.linalg.norm(curve, axis=1), 2.0, atol=1e-4)
     np.testing.assert_allclose(curve[[0, -1]], [[0, 0, -2], [0, 0, 2]], atol=1e-9)
+
+
+def test_path_of_a_body_without_extent_is_drawn() -> None:
+    point = free_body(Sphere(name="point", radius=1e-9), "plane", [(-1.0, 1.0)] * 2)
+    player, window = player_of(point, Scene())
+    player.draw_path(np.linspace([-0.5, 0.0], [0.5, 0.0], 50))
+    points = window.drawn()["/meshcat/path"]["geometries"][0]["path"]["points"]
+    np.testing.assert_allclose(np.array(points)[[0, -1]], [[-0.5, 0, 0], [0.5, 0, 0]], atol=1e-9)
 
 
 def test_arm_at_rest_has_no_path(two_link: Arm) -> None:
