@@ -9,14 +9,10 @@ from numpy.typing import ArrayLike, NDArray
 from densarm.arrays import Array
 from densarm.compiled import compiled
 from densarm.density.gauge import Gauge
+from densarm.density.gauge_gradient import V_MIN, gauge_exponents, write_gauge_gradient
 from densarm.density.implicit_function import ImplicitFunction, UnsafeRegion
 from densarm.density.inverse_bump import log_inverse_bump
-from densarm.density.navigation_density import (
-    V_MIN,
-    DensityParameters,
-    _exponents,
-    _write_gradient,
-)
+from densarm.density.navigation_density import DensityParameters
 from densarm.density.smooth_step import smooth_step
 from densarm.validation import finite_vector
 
@@ -76,7 +72,8 @@ class EuclideanDensity:
         error = rows - self.goal
         alpha = self.parameters.alpha
         out = np.empty_like(rows)
-        _write_gradients(log_psi_gradient, error, alpha, log_psi, *_exponents(gauge, alpha), out)
+        exponents = gauge_exponents(gauge, alpha)
+        _write_gradients(log_psi_gradient, error, alpha, log_psi, *exponents, out)
         return out.reshape(x.shape)
 
     def direction(self, x: Array) -> Array:
@@ -155,7 +152,7 @@ def _write_gradients(
     out: Array,
 ) -> None:
     for row in range(out.shape[0]):
-        _write_gradient(
+        write_gauge_gradient(
             log_psi_gradient[row],
             float(np.sum(error[row] ** 2)),
             2.0 * error[row],

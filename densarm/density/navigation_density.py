@@ -11,8 +11,8 @@ from typing import Generic, TypeVar
 import numpy as np
 
 from densarm.arrays import Array
-from densarm.compiled import compiled
 from densarm.density.gauge import Gauge
+from densarm.density.gauge_gradient import gauge_exponents, write_gauge_gradient
 from densarm.density.goal_distance import GoalDistance
 from densarm.density.smooth_step import smooth_step
 from densarm.density.unsafe_set import UnsafeSet
@@ -20,14 +20,8 @@ from densarm.validation import non_negative, one_of, positive
 
 V = TypeVar("V", bound=GoalDistance)
 
-LOG_SATURATION = math.log(1e150)
-"""Entries of a gradient are held below 1e150 in magnitude, so that its norm is a double too."""
-
 LOG_MAX = math.log(sys.float_info.max)
 """Logarithm of the largest double."""
-
-V_MIN = sys.float_info.min
-"""Below this V counts as this, where its logarithm is needed."""
 
 
 @dataclass(frozen=True)
@@ -118,13 +112,13 @@ class DensitySample:
         Source: [ZNV] eq. 11.
         """
         out = np.empty_like(self.goal_distance_gradient)
-        _write_gradient(
+        write_gauge_gradient(
             self.log_psi_gradient,
             self.goal_distance,
             self.goal_distance_gradient,
             self.parameters.alpha,
             self.log_psi,
-            *_exponents(gauge, self.parameters.alpha),
+            *gauge_exponents(gauge, self.parameters.alpha),
             out,
         )
         return out
@@ -178,7 +172,7 @@ class NavigationDensity(Generic[V]):
         self.unsafe_sets = tuple(unsafe_sets)
         self.goal_distance = goal_distance
         self.parameters = parameters
-        self._exponents = {gauge: _exponents(gauge, parameters.alpha) for gauge in Gauge}
+        self._exponents = {gauge: gauge_exponents(gauge, parameters.alpha) for gauge in Gauge}
         self.log_psi = 0.0
         self.log_psi_gradient: Array = np.zeros_like(goal_distance.error(goal_distance.goal))
         self.goal_distance_value = 0.0
@@ -195,7 +189,7 @@ class NavigationDensity(Generic[V]):
 
     def write_gradient(self, gauge: Gauge, out: Array) -> None:
         """Write `DensitySample.gradient` at the last `update` into `out`, shape (nv,)."""
-        _write_gradient(
+        write_gauge_gradient(
             self.log_psi_gradient,
             self.goal_distance_value,
             self.goal_distance_gradient,
@@ -216,36 +210,3 @@ class NavigationDensity(Generic[V]):
             self.goal_distance.error(q),
             self.parameters,
         )
-
-
-_ALPHA_SHARE = {Gauge.DENSITY: -1.0, Gauge.LOG: 0.0, Gauge.RECIPROCAL: 1.0}
-
-
-def _exponents(gauge: Gauge, alpha: float) -> tuple[float, float]:
-    """Return the exponents of V and of Ψ in the factor by which a gauge's gradient is not w."""
-    share = _ALPHA_SHARE[gauge]
-    return share * alpha - 1.0, -share
-
-
-@compiled
-def _write_gradient(
-    log_psi_gradient: Array,
-    goal_distance: float,
-    goal_distance_gradient: Array,
-    alpha: float,
-    log_psi: float,
-    distance_exponent: float,
-    psi_exponent: float,
-    out: Array,
-) -> None:
-    largest = 0.0
-    for i in range(out.shape[0]):
-        out[i] = goal_distance * log_psi_gradient[i] - alpha * goal_distance_gradient[i]
-        largest = max(largest, abs(out[i]))
-    if largest > 0.0:
-        log_scale = distance_exponent * math.log(max(goal_distance, V_MIN))
-        if psi_exponent != 0.0:  # ln Ψ is infinite in contact
-            log_scale += psi_exponent * log_psi
-        scale = math.exp(min(log_scale + math.log(largest), LOG_SATURATION))
-        for i in range(out.shape[0]):
-            out[i] = out[i] / largest * scale

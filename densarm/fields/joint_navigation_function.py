@@ -5,8 +5,8 @@ import math
 import numpy as np
 
 from densarm.arrays import Array
+from densarm.density.gauge_gradient import V_MIN
 from densarm.density.goal_distance import GoalDistance
-from densarm.density.navigation_density import V_MIN
 from densarm.fields.barriers import Barriers
 from densarm.validation import positive
 

@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from densarm.arrays import Array
+from densarm.density.gauge_gradient import V_MIN
 from densarm.density.implicit_function import ImplicitFunction
-from densarm.density.navigation_density import V_MIN
 from densarm.validation import finite_vector, positive
 
 

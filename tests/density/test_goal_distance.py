@@ -96,8 +96,8 @@ def test_torus_distance_keeps_tiny_errors(arm, kappa):
     distance = TorusDistance(arm, arm.configuration(np.zeros(NV)), WEIGHTS, kappa)
     gradient = np.empty(NV)
     value = distance.evaluate(arm.configuration(np.full(NV, 1e-8)), gradient)
-    assert value == pytest.approx(WEIGHTS.sum() * 1e-16 / 2.0, rel=1e-9)
-    np.testing.assert_allclose(gradient, WEIGHTS * 1e-8, rtol=1e-9)
+    assert value == pytest.approx(WEIGHTS.sum() * 1e-16 / 2.0, rel=1e-12)
+    np.testing.assert_allclose(gradient, WEIGHTS * 1e-8, rtol=1e-12)
 
 
 @given(angles=angle_vectors, turns=arrays(np.int64, NV, elements=st.integers(-2, 2)))
@@ -105,7 +105,7 @@ def test_circle_joints_are_periodic_and_bounded_ones_are_not(arm, angles, turns)
     distance = TorusDistance(arm, arm.configuration(np.zeros(NV)))
     turned = angles + 2.0 * math.pi * turns * arm.is_circle
     value = value_of(distance, arm.configuration(angles))
-    assert value_of(distance, arm.configuration(turned)) == pytest.approx(value, abs=1e-9)
+    assert value_of(distance, arm.configuration(turned)) == pytest.approx(value, rel=1e-12, abs=1e-13)
     wound = np.where(arm.is_circle, 0.0, 2.0 * math.pi)
     assert value_of(distance, arm.configuration(wound)) > 10.0
 
@@ -115,7 +115,7 @@ def test_kappa_runs_from_the_product_to_the_sum(arm, angles):
     goal, q = arm.configuration(np.zeros(NV)), arm.configuration(angles)
     costs = np.where(arm.is_circle, 1.0 - np.cos(angles), angles**2 / 2.0)
     plain_sum = value_of(TorusDistance(arm, goal, kappa=math.inf), q)
-    assert plain_sum == pytest.approx(costs.sum(), rel=1e-9, abs=1e-12)
+    assert plain_sum == pytest.approx(costs.sum(), rel=1e-12, abs=1e-15)
     assert value_of(TorusDistance(arm, goal, kappa=1e9), q) == pytest.approx(plain_sum, rel=1e-6)
     small = 1e-6
     product = value_of(ProductDistance(arm, goal), q)

@@ -53,7 +53,7 @@ def test_contact_is_minus_infinite_and_its_gradient_points_out():
         assert value == -math.inf
         assert -math.inf < gradient[0] < 0.0
         assert log_bump(unsafe_set, np.array([x]), 1, theta=0.1)[0] == pytest.approx(
-            math.log(0.1) + math.log(1.1)
+            math.log(0.1) + math.log(1.1), rel=1e-12
         )
 
 
@@ -77,7 +77,7 @@ def test_joint_limits_act_on_bounded_joints_alone(joint_space, a, b, c):
     ]
     assert value == sum(part for part, _ in parts)
     expected = np.array([parts[0][1] - parts[1][1], 0.0, parts[2][1]])
-    np.testing.assert_allclose(gradient, expected, rtol=1e-9)
+    np.testing.assert_allclose(gradient, expected, rtol=1e-12)
 
 
 @given(st.floats(-3.0, 3.0), st.sampled_from([0.0, 0.1]))
