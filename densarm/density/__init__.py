@@ -1,6 +1,6 @@
 """Navigation densities: unsafe sets, goal distances and the field they make together."""
 
-from densarm.density.divergence import RantzerCondition, rantzer_condition
+from densarm.density.divergence import RantzerCondition, rantzer_condition, rantzer_map
 from densarm.density.gauge import Gauge
 from densarm.density.goal_distance import (
     EuclideanDistance,
@@ -35,5 +35,6 @@ __all__ = [
     "inverse_bump",
     "joint_error",
     "rantzer_condition",
+    "rantzer_map",
     "smooth_step",
 ]

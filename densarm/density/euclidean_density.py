@@ -56,6 +56,10 @@ class EuclideanDensity:
         """Return ln Ψ = Σ ln Ψ_k at points `x` (..., n): (...), −inf in contact for θ = 0."""
         return self._log_bumps(_rows(x))[0].reshape(x.shape[:-1])
 
+    def log_psi_gradient(self, x: Array) -> Array:
+        """Return ∇ ln Ψ [1/m] at points `x` (..., n): (..., n), zero out of sensing regions."""
+        return self._log_bumps(_rows(x))[1].reshape(x.shape)
+
     def log_value(self, x: Array) -> Array:
         """Return ln ρ at points `x` (..., n): (...), −inf in contact for θ = 0."""
         distance = np.maximum(np.sum((x - self.goal) ** 2, axis=-1), V_MIN)

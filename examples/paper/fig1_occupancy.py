@@ -13,6 +13,7 @@ from matplotlib.patches import Circle
 from numpy.typing import NDArray
 
 from densarm.arrays import Array
+from densarm.density.divergence import rantzer_map
 from densarm.density.euclidean_density import EuclideanDensity
 from densarm.density.gauge import Gauge
 from densarm.density.implicit_function import Placed, UnsafeRegion, smallest_value
@@ -46,15 +47,8 @@ FIELD = EuclideanDensity(
 
 
 def source(x: Array) -> Array:
-    """g = ∇·(ρ∇ρ) = ρ² (Δ ln ρ + 2 ‖∇ ln ρ‖²) at points (N, 2), by central differences."""
-    step = 1e-4
-    laplacian = np.zeros(len(x))
-    for axis in range(2):
-        shift = step * np.eye(2)[axis]
-        ahead, behind = (FIELD.gradient(x + sign * shift, Gauge.LOG) for sign in (1.0, -1.0))
-        laplacian += (ahead - behind)[:, axis] / (2.0 * step)
-    squared = np.sum(FIELD.gradient(x, Gauge.LOG) ** 2, axis=1)
-    return np.exp(2.0 * FIELD.log_value(x)) * (laplacian + 2.0 * squared)
+    """g = ∇·(ρ∇ρ) = ρ² (Δ ln ρ + 2 ‖∇ ln ρ‖²) at points (N, 2)."""
+    return np.exp(2.0 * FIELD.log_value(x)) * rantzer_map(FIELD, x, step=1e-4).margin(Gauge.DENSITY)
 
 
 def weighted_starts(count: int) -> tuple[Array, Array]:

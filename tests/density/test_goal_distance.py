@@ -105,7 +105,8 @@ def test_circle_joints_are_periodic_and_bounded_ones_are_not(arm, angles, turns)
     distance = TorusDistance(arm, arm.configuration(np.zeros(NV)))
     turned = angles + 2.0 * math.pi * turns * arm.is_circle
     value = value_of(distance, arm.configuration(angles))
-    assert value_of(distance, arm.configuration(turned)) == pytest.approx(value, rel=1e-12, abs=1e-13)
+    same = value_of(distance, arm.configuration(turned))
+    assert same == pytest.approx(value, rel=1e-12, abs=1e-13)
     wound = np.where(arm.is_circle, 0.0, 2.0 * math.pi)
     assert value_of(distance, arm.configuration(wound)) > 10.0
 
