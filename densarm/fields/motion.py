@@ -77,9 +77,11 @@ class EllipticMotion:
     def position(self, time: float) -> Array:
         """Act as `Motion.position`."""
         angle = self.rate * time + self.phase
-        return np.add(self.centre, np.array(self.semi_axes) * [np.cos(angle), np.sin(angle)])
+        turned: Array = np.array([np.cos(angle), np.sin(angle)])
+        return np.array(self.centre) + np.array(self.semi_axes) * turned
 
     def velocity(self, time: float) -> Array:
         """Act as `Motion.velocity`."""
         angle = self.rate * time + self.phase
-        return self.rate * np.array(self.semi_axes) * [-np.sin(angle), np.cos(angle)]
+        turned: Array = np.array([-np.sin(angle), np.cos(angle)])
+        return self.rate * np.array(self.semi_axes) * turned

@@ -26,7 +26,7 @@ DT, DURATION, SETTLED = 0.04, 20.0, 14.0  # time step, of a run, and after which
 RADIUS, SENSED = 0.5, 1.2  # of the obstacles and of their sensing regions [m]
 TARGET = EllipticMotion((0.0, 0.0), semi_axes=(1.0, 0.6), rate=0.3)  # at most 0.3 m/s
 HELD_ERROR = 0.3**2 * DT / (2.0 * GAIN)  # at most: acceleration of the target times Δt/2λ [m]
-ORBITS = ((1.9, 1, 0.3), (2.6, -1, 1.5), (3.3, 1, 3.5), (4.0, -1, 5.0))  # radius [m], sense, phase
+ORBITS = ((1.9, 1, 0.3), (3.1, -1, 1.5), (3.1, -1, 4.2), (4.3, 1, 5.0))  # radius [m], sense, phase
 SLOW, FAST = (0.25, 0.5, 0.9), (1.25, 2.0, 3.0)  # obstacle speeds per u_max
 UNBOUNDED_SPEED, UNBOUNDED_DURATION = 3.0, 12.0  # of the run in continuous time [m/s], [s]
 HALF = 5.0  # starts are drawn in the square |x_i| <= HALF [m]
@@ -101,13 +101,14 @@ def draw(runs: dict[float, TrackingRuns], free: dict[str, Array]) -> Figure:
     errors.plot(free["time"], free["error"].max(axis=1), "--", color=style.VERMILION,
                 label="largest")  # fmt: skip
     errors.set_yscale("log")
+    errors.set_ylim(1e-8, 1e4)  # room for the legend
     errors.set_xlabel("time [s]")
     errors.set_ylabel("distance from the target [m]")
     errors.set_title("(b) tracking error", fontsize=9.5)
     draw_rates(rates, runs)
     for ax in (errors, rates):
         ax.grid(alpha=0.3)
-        ax.legend()
+        ax.legend(loc="upper left")
     return figure
 
 
@@ -123,12 +124,12 @@ def draw_plane(ax: Axes, runs: TrackingRuns) -> None:
         path = np.array([moving.motion.position(t) for t in runs.time[past]])
         ax.plot(*path.T, color=style.BLACK, linewidth=1.0, linestyle=":")
     target = np.array([TARGET.position(t) for t in runs.time[past]])
-    ax.plot(*target.T, color=style.GREEN, linewidth=2.5, label="target")
+    ax.plot(*target.T, color=style.GREEN, linewidth=2.5, label="path of the target")
     x = runs.x[past][:, :SHOWN]
     style.draw_curves(ax, list(np.swapaxes(x, 0, 1)), [style.BLUE] * x.shape[1], width=1.2)
     ax.plot(*x[0].T, ".", color=style.BLACK, markersize=5, label="starts")
     style.mark_goal(ax, snapshot.goal)
-    ax.legend(loc="lower left", ncols=3)
+    ax.legend(loc="upper left")
 
 
 def draw_rates(ax: Axes, runs: dict[float, TrackingRuns]) -> None:
