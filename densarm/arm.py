@@ -14,16 +14,23 @@ from densarm.arrays import Array
 from densarm.catalogue import robot_description, robot_names
 from densarm.errors import InvalidValueError, UnknownNameError
 from densarm.joint_limits import JointLimits, joint_limits
+from densarm.joint_selection import only_joints, without_joints
 from densarm.robot_description import RobotDescription, read_text
-from densarm.robot_models import build_models, build_visual_model, joint_names
+from densarm.robot_models import build_models, build_visual_model
 from densarm.self_collision import srdf_postures
-from densarm.validation import finite_tuple, finite_vector, one_of
+from densarm.validation import finite_vector
 
 __all__ = ["Arm", "JointLimits", "load_arm"]
+
+_NEUTRAL_ROOM = 0.1  # share of a joint's range that the neutral posture keeps from each limit
+_FARTHEST = 1e6  # [rad or m], stands for no limit
 
 
 class Arm:
     """A robot arm: a chain or tree of revolute, continuous and prismatic joints.
+
+    `postures` are those that the robot comes with, and ``neutral``: every joint at zero, or as
+    near to it as a tenth of its range from the limits allows.
 
     Args:
         description: URDF, SRDF and what else the models are built from.
@@ -163,10 +170,12 @@ class Arm:
         return np.array(pin.nonLinearEffects(self.model, self.data, q, v))
 
     def _end_effector(self) -> str:
-        names = [frame.name for frame in self.model.frames]
+        frames = list(self.model.frames)
+        names = [frame.name for frame in frames]
         name = self.description.end_effector
         if name is None:
-            return str(names[-1])
+            last = self.model.njoints - 1
+            return str([frame.name for frame in frames if frame.parentJoint == last][-1])
         if name not in names:
             raise UnknownNameError("end-effector frame", name, names)
         return name
@@ -178,7 +187,13 @@ class Arm:
                 postures[name] = self.configuration([positions[j] for j in self.joint_names])
         for name, angles in self.description.postures.items():
             postures[name] = self.configuration(angles)
+        postures.setdefault("neutral", self.configuration(self._neutral()))
         return postures
+
+    def _neutral(self) -> Array:
+        lower, upper = np.clip([self.limits.lower, self.limits.upper], -_FARTHEST, _FARTHEST)
+        room = _NEUTRAL_ROOM * (upper - lower)
+        return np.asarray(np.clip(0.0, lower + room, upper - room))
 
 
 def load_arm(
@@ -186,38 +201,47 @@ def load_arm(
     *,
     srdf: str | Path | None = None,
     package_dirs: Iterable[str | Path] = (),
+    joints: Iterable[str] | None = None,
     locked_joints: Mapping[str, float] | None = None,
     base_placement: pin.SE3 | None = None,
     shapes: str = "hull",
 ) -> Arm:
     """Load an arm by name or from a URDF file.
 
+    Joints that mimic locked ones are locked with them.
+
     Args:
         robot: a known name (``densarm list``), or the path of a URDF.
         srdf: path of an SRDF, for disabled pairs and postures.
         package_dirs: folders that ``package://`` paths of meshes start from; the URDF's own
             folder and those above it are searched too.
+        joints: exact URDF names of the joints that make the arm, in any order: all others are
+            locked, at zero or at the limit next to it; None for every joint.
         locked_joints: exact URDF joint name to position [rad or m], which may lie outside limits.
         base_placement: pose of the base in the world; gravity and obstacles stay.
-        shapes: "hull" for the collision geometry as it is, or "capsule" for the capsules that
-            a named arm comes with.
+        shapes: "hull" for the convex hulls of the collision geometry, or "capsule" for the
+            smallest capsule around each of them: larger, but distances cost less.
 
     Raises:
-        UnknownNameError: no such robot, joint to lock, or link of the SRDF.
-        InvalidValueError: a locked position or base placement that is not finite, or shapes that
-            the robot does not come with.
+        UnknownNameError: no such robot, joint, or link of the SRDF.
+        InvalidValueError: a locked position or base placement that is not finite, a locked joint
+            that shall be in the arm, or shapes of another name.
         FileContentError: a file that cannot be read.
         RobotDescriptionError: a URDF or SRDF that cannot be used.
     """
     path = Path(robot)
     if str(robot) in robot_names():
-        description = robot_description(str(robot), shapes)
+        description = robot_description(str(robot))
     elif path.suffix == ".urdf" or path.is_file():
-        one_of("shapes", shapes, ["hull"])
         description = _description_of_file(path)
     else:
         raise UnknownNameError("robot", robot, [*robot_names(), "the path of a .urdf file"])
-    return Arm(_with_options(description, srdf, package_dirs, locked_joints, base_placement))
+    description = replace(description, shapes=shapes)
+    description = _with_options(description, srdf, package_dirs, base_placement)
+    if joints is not None:
+        chosen = (joints,) if isinstance(joints, str) else tuple(joints)
+        return Arm(only_joints(description, chosen, locked_joints or {}))
+    return Arm(without_joints(description, locked_joints or {}))
 
 
 def _description_of_file(path: Path) -> RobotDescription:
@@ -229,40 +253,21 @@ def _description_of_file(path: Path) -> RobotDescription:
 def _with_options(
     description: RobotDescription,
     srdf: str | Path | None,
-    package_dirs: Iterable[str | Path],
-    locked_joints: Mapping[str, float] | None,
+    folders: Iterable[str | Path],
     base_placement: pin.SE3 | None,
 ) -> RobotDescription:
     if base_placement is not None and not isinstance(base_placement, pin.SE3):
         raise InvalidValueError("base_placement", base_placement, "a pinocchio.SE3")
-    if isinstance(package_dirs, str | Path):
-        package_dirs = [package_dirs]
-    folders = tuple(str(Path(folder).resolve()) for folder in package_dirs)
-    if locked_joints:
-        description = _without_joints(description, locked_joints)
+    if isinstance(folders, str | Path):
+        folders = [folders]
+    given = tuple(str(Path(folder).resolve()) for folder in folders)
     return replace(
         description,
         srdf=description.srdf if srdf is None else read_text(Path(srdf)),
-        package_dirs=folders + description.package_dirs,
+        package_dirs=given + description.package_dirs,
         base_placement=(
             description.base_placement
             if base_placement is None
             else tuple(pin.SE3ToXYZQUAT(base_placement).tolist())
         ),
-    )
-
-
-def _without_joints(description: RobotDescription, locked: Mapping[str, float]) -> RobotDescription:
-    """Lock joints, and take their entries out of the values given per joint."""
-    names = joint_names(description)
-    kept = [i for i, name in enumerate(names) if name not in locked]
-    given, postures = description.acceleration, description.postures
-    return replace(
-        description,
-        locked_joints={
-            **description.locked_joints,
-            **{j: finite_tuple(f"locked_joints.{j}", [x], 1)[0] for j, x in locked.items()},
-        },
-        acceleration=None if given is None else tuple(given[i] for i in kept),
-        postures={key: tuple(angles[i] for i in kept) for key, angles in postures.items()},
     )

@@ -4,7 +4,7 @@ import tomllib
 from pathlib import Path
 from typing import Any
 
-from densarm.errors import FileContentError, RobotDescriptionError, UnknownNameError
+from densarm.errors import FileContentError, UnknownNameError
 from densarm.robot_description import DATA_WHEEL, RobotDescription, read_text, resolve_path
 
 
@@ -25,33 +25,27 @@ def scenario_paths() -> dict[str, Path]:
     return {path.stem: path for path in sorted(robots_folder().glob("*/scenarios/*.toml"))}
 
 
-def robot_description(name: str, shapes: str = "hull") -> RobotDescription:
+def robot_description(name: str) -> RobotDescription:
     """Return the description of a named robot.
 
     Args:
         name: one of `robot_names`.
-        shapes: "hull" or "capsule".
 
     Raises:
-        UnknownNameError: no such robot, or no such shapes.
-        RobotDescriptionError: the robot comes without capsules.
+        UnknownNameError: no such robot.
     """
     if name not in robot_names():
         raise UnknownNameError("robot", name, robot_names())
-    if shapes not in ("hull", "capsule"):
-        raise UnknownNameError("shapes", shapes, ["hull", "capsule"])
     folder = robots_folder() / name
     entry = read_toml(folder / "arm.toml")
-    key = "urdf" if shapes == "hull" else "capsules"
-    if key not in entry:
-        raise RobotDescriptionError(f"robot {name!r} comes without capsules: use shapes 'hull'")
+    urdf = entry["urdf"]
     srdf = entry.get("srdf")
     acceleration = entry.get("acceleration")
     return RobotDescription(
         name=name,
-        urdf=read_text(resolve_path(entry[key], folder)),
+        urdf=read_text(resolve_path(urdf, folder)),
         srdf=None if srdf is None else read_text(resolve_path(srdf, folder)),
-        package_dirs=(DATA_WHEEL,) if DATA_WHEEL in entry[key] else (str(folder),),
+        package_dirs=(DATA_WHEEL,) if DATA_WHEEL in urdf else (str(folder),),
         locked_joints=entry.get("locked_joints", {}),
         acceleration=None if acceleration is None else tuple(acceleration),
         end_effector=entry.get("end_effector"),

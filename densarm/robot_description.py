@@ -8,6 +8,8 @@ from pathlib import Path
 from typing import Any
 
 from densarm.errors import DensarmError, FileContentError, RobotDescriptionError
+from densarm.shapes import SHAPES
+from densarm.validation import one_of
 
 DATA_WHEEL = "example-robot-data"
 """Prefix ``example-robot-data:`` of a path inside that wheel's folder of robots."""
@@ -18,6 +20,9 @@ class RobotDescription:
     """URDF and SRDF as text, with what Pinocchio needs beside them.
 
     Holding text, not paths, lets a recorded run rebuild its own arm.
+
+    Raises:
+        InvalidValueError: shapes of another name.
     """
 
     name: str
@@ -37,6 +42,11 @@ class RobotDescription:
     """Frame whose path is drawn; None for the last link."""
     postures: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
     """Named joint positions, one number per joint [rad or m]."""
+    shapes: str = "hull"
+    """What distances are measured to: "hull" or "capsule"."""
+
+    def __post_init__(self) -> None:
+        one_of("shapes", self.shapes, SHAPES)
 
     def to_json(self) -> dict[str, Any]:
         """Return the description as JSON data; `from_json` is its inverse."""

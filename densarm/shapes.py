@@ -9,6 +9,10 @@ from numpy.typing import ArrayLike
 
 from densarm.arrays import Array
 from densarm.errors import RobotDescriptionError
+from densarm.fitted_capsule import fitted_capsule
+
+SHAPES = ("hull", "capsule")
+"""Shapes of an arm: convex hulls, or around each hull the smallest capsule."""
 
 CYLINDER_SIDES = 64
 """Sides of the prism that stands for a cylinder; it exceeds the radius by 0.12 %."""
@@ -16,8 +20,9 @@ CYLINDER_SIDES = 64
 # [m], agreement of a cylinder's ends with the spheres on them: URDFs write 1.57 for a right angle.
 _CAPSULE_TOLERANCE = 1e-4
 
-_FLATNESS = 1e-9  # thickness over width of points that count as lying in one plane
+_FLATNESS = 1e-6  # thickness, over the largest coordinate, of points that count as in one plane
 _FARTHEST = 1e6  # [m]
+_CELLS = 64  # along each side of a mesh whose hull is too fine for coal
 
 
 def convex_hull(points: Array) -> coal.ConvexBase:
@@ -59,16 +64,19 @@ def box_hull(size: ArrayLike) -> coal.ConvexBase:
     return convex_hull(corners * np.asarray(size, dtype=np.float64))
 
 
-def differentiable_geometry(model: pin.Model, geometry: pin.GeometryModel) -> pin.GeometryModel:
+def differentiable_geometry(
+    model: pin.Model, geometry: pin.GeometryModel, shapes: str = "hull"
+) -> pin.GeometryModel:
     """Return a geometry model of shapes whose distance coal differentiates.
 
-    Spheres, capsules and convex hulls stay; a box or a mesh becomes its convex hull, a cylinder
-    with an equal sphere on each end one capsule, any other cylinder a circumscribed prism. Each
-    encloses what it stands for.
+    Spheres and capsules stay; a cylinder with an equal sphere on each end becomes one capsule, a
+    box or a mesh its convex hull, any other cylinder a circumscribed prism. Each encloses what it
+    stands for.
 
     Args:
         model: the arm's model, whose frames name the links.
         geometry: its collision geometry as the URDF gives it.
+        shapes: one of `SHAPES`.
 
     Raises:
         RobotDescriptionError: a shape of another kind (ellipsoid, cone, plane, ...), of a size
@@ -82,6 +90,9 @@ def differentiable_geometry(model: pin.Model, geometry: pin.GeometryModel) -> pi
         for item in _merge_capsules(items):
             item.geometry = _differentiable_shape(item, model.frames[frame].name)
             item.meshScale = np.ones(3)
+            if shapes == "capsule" and isinstance(item.geometry, coal.ConvexBase):
+                item.geometry, pose = fitted_capsule(np.array(item.geometry.points())).shape()
+                item.placement = item.placement * pose
             result.addGeometryObject(item)
     return result
 
@@ -134,6 +145,13 @@ def _hull(points: Array, name: str) -> coal.ConvexBase:
         raise RobotDescriptionError(f"{name} has vertices that are not finite, or beyond 1000 km")
     if _is_flat(points):
         raise RobotDescriptionError(f"{name} has no convex hull: its vertices span no volume")
+    try:
+        return _qhull(points)
+    except RuntimeError:  # coal takes 255 neighbours of a corner; a round face can have more
+        return _qhull(_coarsened(points))
+
+
+def _qhull(points: Array) -> coal.ConvexBase:
     mesh = coal.BVHModelOBBRSS()
     mesh.beginModel(0, len(points))
     mesh.addVertices(points)
@@ -142,11 +160,19 @@ def _hull(points: Array, name: str) -> coal.ConvexBase:
     return mesh.convex
 
 
+def _coarsened(points: Array) -> Array:
+    """Return the corners of a grid's cells that hold the points; they enclose them."""
+    low = points.min(axis=0)
+    cell = (points.max(axis=0) - low) / _CELLS
+    corners = np.floor((points - low) / cell)[:, np.newaxis] + list(product((0.0, 1.0), repeat=3))
+    return np.asarray(low + cell * np.unique(corners.reshape(-1, 3), axis=0))
+
+
 def _is_flat(points: Array) -> bool:
     if len(points) < 4:
         return True
-    width = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
-    return bool(width[2] <= _FLATNESS * width[0])
+    thin = np.linalg.svd(points - points.mean(axis=0), full_matrices=False)[2][2]
+    return bool(np.ptp(points @ thin) <= _FLATNESS * np.abs(points).max())
 
 
 def _merge_capsules(items: list[pin.GeometryObject]) -> list[pin.GeometryObject]:

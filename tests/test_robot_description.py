@@ -75,8 +75,6 @@ def test_catalogue():
         assert Arm(robot_description(name)).name == name
     with pytest.raises(UnknownNameError, match=r"'tow_link'; did you mean 'two_link'"):
         robot_description("tow_link")
-    with pytest.raises(RobotDescriptionError, match="'two_link' comes without capsules"):
-        robot_description("two_link", "capsule")
 
 
 def test_paths():

@@ -50,11 +50,17 @@ def test_panda_srdf_leaves_pairs_that_can_collide():
     assert not expected(("panda_link6", "panda_hand")) & pairs
 
 
+INERTIAL = (
+    '<inertial><mass value="1"/>'
+    '<inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial>'
+)
+
+
 def arm_with_collar(radius: float) -> Arm:
     """Three links in a row, the last one with a ball around its joint."""
     links = ["base", "one", "two", "three"]
     body = "".join(
-        f'<link name="{link}"><collision><geometry><sphere radius="{size}"/></geometry>'
+        f'<link name="{link}">{INERTIAL}<collision><geometry><sphere radius="{size}"/></geometry>'
         "</collision></link>"
         for link, size in zip(links, [0.1, 0.1, 0.1, radius], strict=True)
     )

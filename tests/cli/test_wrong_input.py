@@ -108,5 +108,3 @@ def test_file_that_is_not_a_run(command, tmp_path, verb):
 def test_arm_to_time(command, tmp_path):
     refused(command("bench", "step", "--arm", "atlas"), tmp_path, "'atlas'", "panda")
     refused(command("bench", "step", "--arm", "two_link", "--pairs", 3), tmp_path, "pairs = 3")
-    done = command("bench", "step", "--arm", "two_link", "--shapes", "capsule")
-    refused(done, tmp_path, "capsules")

@@ -1,0 +1,111 @@
+"""A URDF's text to Pinocchio's models, with the reason in one line where that fails."""
+
+import os
+import xml.etree.ElementTree as ElementTree
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import TypeVar
+
+import coal
+import pinocchio as pin
+
+from densarm.captured_stderr import captured_stderr
+from densarm.errors import RobotDescriptionError
+from densarm.robot_description import RobotDescription, parse_robot_xml, resolve_package_dir
+
+T = TypeVar("T")
+
+_ELEMENT = {pin.GeometryType.COLLISION: "collision", pin.GeometryType.VISUAL: "visual"}
+
+
+class Urdf:
+    """A URDF that Pinocchio can parse: capsules as cylinders, meshes by absolute paths.
+
+    Args:
+        description: the arm.
+
+    Raises:
+        RobotDescriptionError: the text is not a URDF, with the reason.
+    """
+
+    def __init__(self, description: RobotDescription) -> None:
+        self.root = parse_robot_xml(description.urdf, "URDF")
+        self._folders = [resolve_package_dir(folder) for folder in description.package_dirs]
+        self._capsules = {name: _rename_capsules(self.root, name) for name in _ELEMENT.values()}
+        self.model: pin.Model = _from_urdf(lambda: pin.buildModelFromXML(self._text()))
+        """The model, of all joints that the URDF has."""
+
+    def geometry(self, kind: pin.GeometryType) -> pin.GeometryModel:
+        """Return the collision or visual geometry.
+
+        Raises:
+            RobotDescriptionError: a mesh is missing or cannot be read, or a shape is unknown.
+        """
+        element = _ELEMENT[kind]
+        _resolve_meshes(self.root, element, self._folders)
+        text = self._text()
+        geometry = _from_urdf(lambda: pin.buildGeomFromUrdfString(self.model, text, kind))
+        for item in geometry.geometryObjects:
+            if item.name in self._capsules[element]:
+                item.geometry = coal.Capsule(item.geometry.radius, 2.0 * item.geometry.halfLength)
+        return geometry
+
+    def _text(self) -> str:
+        return ElementTree.tostring(self.root, encoding="unicode")
+
+
+def _rename_capsules(root: ElementTree.Element, element: str) -> set[str]:
+    """Call capsules cylinders, which the parser knows, and return their names in Pinocchio."""
+    names = set()
+    for link in root.iter("link"):
+        for index, item in enumerate(link.iter(element)):
+            for capsule in item.iter("capsule"):
+                capsule.tag = "cylinder"
+                names.add(f"{link.get('name')}_{index}")
+    return names
+
+
+def _resolve_meshes(root: ElementTree.Element, element: str, folders: Sequence[str]) -> None:
+    for link in root.iter("link"):
+        for mesh in (mesh for item in link.iter(element) for mesh in item.iter("mesh")):
+            name = mesh.get("filename", "")
+            file = _mesh_file(name, folders)
+            if file is None:
+                raise RobotDescriptionError(
+                    f"URDF: mesh {name!r} of link {link.get('name')!r} could not be found in "
+                    f"{', '.join(folders)}; name the folders that hold its package as package_dirs"
+                )
+            mesh.set("filename", str(file))
+
+
+def _mesh_file(name: str, folders: Sequence[str]) -> Path | None:
+    """Return the file that a path, ``file://``, ``package://`` or ``model://`` names.
+
+    A package may lie in a folder of another name, as after unpacking an archive.
+    """
+    scheme, _, path = name.rpartition("://")
+    inside = path.partition("/")[2] if scheme in {"package", "model"} else path
+    for candidate in (Path(folder) / part for part in (path, inside) for folder in folders):
+        # Not Path.is_file, which raises where a name is too long.
+        if os.path.isfile(candidate):  # noqa: PTH113
+            return candidate.resolve()
+    return None
+
+
+def _from_urdf(parse: Callable[[], T]) -> T:
+    """Return what a parser of Pinocchio makes of a URDF, or raise the reason that it prints.
+
+    It also prints, and goes on without them, about shapes and inertias that it cannot read.
+    """
+    raised = ""
+    with captured_stderr() as printed:
+        try:
+            result = parse()
+        except (ValueError, RuntimeError) as error:
+            raised = str(error) or type(error).__name__
+    # urdfdom marks its lines by "Error:", coal the line that matters by "message:".
+    reasons = [line.partition("Error:")[2].strip() for line in printed if "Error:" in line]
+    if reasons or raised:
+        reason = [*reasons, *raised.split("message: ")[-1].splitlines()][0]
+        raise RobotDescriptionError(f"URDF: {reason.rstrip('.')}")
+    return result
