@@ -1,6 +1,7 @@
 """Joints of a URDF that an arm does not move, and where they stand."""
 
 from collections.abc import Mapping
+from typing import NamedTuple
 
 import numpy as np
 import pinocchio as pin
@@ -18,26 +19,31 @@ def locked_positions(urdf: Urdf, given: Mapping[str, float]) -> dict[str, float]
         given: joint name to position [rad or m].
 
     Raises:
-        RobotDescriptionError: a joint mimics one that moves, or is hard to understand.
+        RobotDescriptionError: a joint mimics one that moves, or that is none.
         UnknownNameError: a joint that the URDF does not have.
         InvalidValueError: a position that is not finite.
     """
     names = list(urdf.model.names)[1:]
-    for name, position in given.items():
+    for name in given:
         if name not in names:
             raise UnknownNameError("joint to lock", name, names)
-        finite_vector(f"locked_joints.{name}", [position], 1)
-    locked = dict(given)
+    all_joints = {joint.get("name", "") for joint in urdf.root.iter("joint")}
+    standing = {**dict.fromkeys(all_joints - set(names), 0.0), **given}
     followers = {name: m for name, m in mimicked_joints(urdf).items() if name not in given}
-    while ready := [name for name, (leader, _, _) in followers.items() if leader in locked]:
+    while ready := [name for name, mimic in followers.items() if mimic.leader in standing]:
         for name in ready:
-            leader, multiplier, offset = followers.pop(name)
-            locked[name] = multiplier * locked[leader] + offset
-    for name, (leader, _, _) in followers.items():
+            mimic = followers.pop(name)
+            standing[name] = mimic.multiplier * standing[mimic.leader] + mimic.offset
+    for name, mimic in followers.items():
+        moves = mimic.leader in names
         raise RobotDescriptionError(
-            f"joint {name!r} mimics {leader!r}, which moves; this is not supported: lock "
-            f"the one or the other by locked_joints={{{leader!r}: position}}"
+            f"joint {name!r} mimics {mimic.leader!r}, which {'moves' if moves else 'is no joint'}: "
+            f"lock {'either' if moves else 'it'} by "
+            f"locked_joints={{{mimic.leader if moves else name!r}: position}}"
         )
+    locked = {name: standing[name] for name in names if name in standing}
+    for name, position in locked.items():
+        finite_vector(f"locked_joints.{name}", [position], 1)
     return locked
 
 
@@ -67,23 +73,30 @@ def lock_joints(
     return model, geometry
 
 
-def mimicked_joints(urdf: Urdf) -> dict[str, tuple[str, float, float]]:
-    """Return, by joint, the joint that it mimics, the multiplier and the offset.
+class Mimic(NamedTuple):
+    """How a joint follows another: position = multiplier times the leader's + offset."""
+
+    leader: str
+    multiplier: float
+    offset: float
+
+
+def mimicked_joints(urdf: Urdf) -> dict[str, Mimic]:
+    """Return the joints that mimic others, by name.
 
     Raises:
         RobotDescriptionError: a multiplier or offset that is not a finite number.
     """
     mimics = {}
     for joint in urdf.root.iter("joint"):
-        mimic = joint.find("mimic")
-        if mimic is not None:
-            name = joint.get("name", "")
-            multiplier, offset = (_number(name, mimic.get(key, default)) for key, default in _MIMIC)
-            mimics[name] = (mimic.get("joint", ""), multiplier, offset)
+        element, name = joint.find("mimic"), joint.get("name", "")
+        if element is not None and urdf.model.existJointName(name):
+            mimics[name] = Mimic(
+                element.get("joint", ""),
+                _number(name, element.get("multiplier", "1")),
+                _number(name, element.get("offset", "0")),
+            )
     return mimics
-
-
-_MIMIC = (("multiplier", "1"), ("offset", "0"))
 
 
 def _number(joint: str, text: str) -> float:
