@@ -17,6 +17,7 @@ from densarm.validation import finite_vector, unit_quaternion
 
 _SAMPLES = 5
 _SINGULAR = 1e-10
+_FARTHEST = 1e6  # [m]
 
 
 class RobotModels(NamedTuple):
@@ -80,7 +81,7 @@ def _require_arm(model: pin.Model) -> None:
     if model.nv == 0:
         raise RobotDescriptionError("the robot has no joint to move")
     for joint, name in zip(list(model.joints)[1:], list(model.names)[1:], strict=True):
-        reason = _unusable(joint) or _immovable(model, joint)
+        reason = _unusable(model, joint) or _immovable(model, joint)
         if reason:
             raise RobotDescriptionError(f"joint {name!r} {reason}")
     for name, inertia in zip(model.names, model.inertias, strict=True):
@@ -89,12 +90,14 @@ def _require_arm(model: pin.Model) -> None:
     _require_inertia(model)
 
 
-def _unusable(joint: pin.JointModel) -> str:
+def _unusable(model: pin.Model, joint: pin.JointModel) -> str:
     if joint.nv != 1:
         return (
             f"has {joint.nv} degrees of freedom: only revolute, continuous and prismatic joints "
             "are supported (locked_joints takes it at 0, its neutral pose)"
         )
+    if not (np.abs(model.jointPlacements[joint.id].translation) < _FARTHEST).all():
+        return "has an origin that is not finite, or beyond 1000 km"
     if np.abs(joint.createData().S).max() == 0.0:
         return "has the axis 0 0 0, which has no direction"
     return ""

@@ -80,11 +80,12 @@ def differentiable_geometry(
 
     Raises:
         RobotDescriptionError: a shape of another kind (ellipsoid, cone, plane, ...), of a size
-            that is not positive, or a mesh without volume; by name.
+            that is not positive, farther away than 1000 km, or a mesh without volume; by name.
     """
     result = pin.GeometryModel()
     by_link: dict[int, list[pin.GeometryObject]] = {}
     for item in geometry.geometryObjects:
+        _require_usual_size(item, model.frames[item.parentFrame].name)
         by_link.setdefault(item.parentFrame, []).append(item)
     for frame, items in by_link.items():
         for item in _merge_capsules(items):
@@ -113,12 +114,20 @@ def extreme_points(shape: coal.CollisionGeometry) -> tuple[Array, float]:
     return np.array(shape.points()), 0.0
 
 
+def _require_usual_size(item: pin.GeometryObject, link: str) -> None:
+    sizes = np.array(_sizes(item.geometry))
+    numbers = np.array([*sizes, *item.placement.translation])
+    reason = "a size that is not positive" if not (sizes > 0.0).all() else ""
+    if not (np.abs(numbers) < _FARTHEST).all():
+        reason = "a size or position that is not finite, or beyond 1000 km"
+    if reason:
+        raise RobotDescriptionError(
+            f"collision geometry {item.name!r} of link {link!r} has {reason}"
+        )
+
+
 def _differentiable_shape(item: pin.GeometryObject, link: str) -> coal.CollisionGeometry:
     shape = item.geometry
-    if not all(size > 0.0 for size in _sizes(shape)):
-        raise RobotDescriptionError(
-            f"collision geometry {item.name!r} of link {link!r} has a size that is not positive"
-        )
     if isinstance(shape, coal.Sphere | coal.Capsule | coal.ConvexBase):
         return shape
     if isinstance(shape, coal.Box):

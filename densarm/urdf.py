@@ -46,7 +46,7 @@ class Urdf:
         text = self._text()
         geometry = _from_urdf(lambda: pin.buildGeomFromUrdfString(self.model, text, kind))
         for item in geometry.geometryObjects:
-            if item.name in self._capsules[element]:
+            if item.name in self._capsules[element] and isinstance(item.geometry, coal.Cylinder):
                 item.geometry = coal.Capsule(item.geometry.radius, 2.0 * item.geometry.halfLength)
         return geometry
 
@@ -57,9 +57,10 @@ class Urdf:
 def _rename_capsules(root: ElementTree.Element, element: str) -> set[str]:
     """Call capsules cylinders, which the parser knows, and return their names in Pinocchio."""
     names = set()
-    for link in root.iter("link"):
-        for index, item in enumerate(link.iter(element)):
-            for capsule in item.iter("capsule"):
+    for link in root.findall("link"):
+        for index, item in enumerate(link.findall(element)):
+            capsule = item.find("geometry/capsule")
+            if capsule is not None:
                 capsule.tag = "cylinder"
                 names.add(f"{link.get('name')}_{index}")
     return names
