@@ -51,7 +51,9 @@ class Arm:
         self.idx_q: NDArray[np.int64] = np.array([joint.idx_q for joint in joints])
         self.is_circle: NDArray[np.bool_] = np.array([joint.nq == 2 for joint in joints])
         self.limits: JointLimits = joint_limits(self.model, description.acceleration)
-        self.end_effector = self._end_effector()
+        self.end_effector_id: int = self._end_effector()
+        """Index of the frame whose path is drawn."""
+        self.end_effector: str = self.model.frames[self.end_effector_id].name
         self.postures: dict[str, Array] = self._postures()
 
     @cached_property
@@ -169,16 +171,16 @@ class Arm:
         v = finite_vector("velocity", v, self.nv)
         return np.array(pin.nonLinearEffects(self.model, self.data, q, v))
 
-    def _end_effector(self) -> str:
+    def _end_effector(self) -> int:
         frames = list(self.model.frames)
-        names = [frame.name for frame in frames]
         name = self.description.end_effector
         if name is None:
             last = self.model.njoints - 1
-            return str([frame.name for frame in frames if frame.parentJoint == last][-1])
-        if name not in names:
-            raise UnknownNameError("end-effector frame", name, names)
-        return name
+            return max(k for k, frame in enumerate(frames) if frame.parentJoint == last)
+        if not self.model.existFrame(name):
+            raise UnknownNameError("end-effector frame", name, [frame.name for frame in frames])
+        # A link and its joint may share a name; the link's frame comes after the joint's.
+        return max(k for k, frame in enumerate(frames) if frame.name == name)
 
     def _postures(self) -> dict[str, Array]:
         postures: dict[str, Array] = {}

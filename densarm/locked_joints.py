@@ -82,28 +82,14 @@ class Mimic(NamedTuple):
 
 
 def mimicked_joints(urdf: Urdf) -> dict[str, Mimic]:
-    """Return the joints that mimic others, by name.
-
-    Raises:
-        RobotDescriptionError: a multiplier or offset that is not a finite number.
-    """
+    """Return the joints that mimic others, by name."""
     mimics = {}
     for joint in urdf.root.iter("joint"):
         element, name = joint.find("mimic"), joint.get("name", "")
         if element is not None and urdf.model.existJointName(name):
             mimics[name] = Mimic(
                 element.get("joint", ""),
-                _number(name, element.get("multiplier", "1")),
-                _number(name, element.get("offset", "0")),
+                float(element.get("multiplier", "1")),
+                float(element.get("offset", "0")),
             )
     return mimics
-
-
-def _number(joint: str, text: str) -> float:
-    try:
-        value = float(text)
-    except ValueError:
-        value = np.nan
-    if not np.isfinite(value):
-        raise RobotDescriptionError(f"URDF: mimic of joint {joint!r}: {text!r} is no finite number")
-    return value

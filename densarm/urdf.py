@@ -34,6 +34,7 @@ class Urdf:
         self._capsules = {name: _rename_capsules(self.root, name) for name in _ELEMENT.values()}
         self.model: pin.Model = _from_urdf(lambda: pin.buildModelFromXML(self._text()))
         """The model, of all joints that the URDF has."""
+        self._require_tree()
 
     def geometry(self, kind: pin.GeometryType) -> pin.GeometryModel:
         """Return the collision or visual geometry.
@@ -49,6 +50,15 @@ class Urdf:
             if item.name in self._capsules[element] and isinstance(item.geometry, coal.Cylinder):
                 item.geometry = coal.Capsule(item.geometry.radius, 2.0 * item.geometry.halfLength)
         return geometry
+
+    def _require_tree(self) -> None:
+        """Refuse links that the parser has left out, as it does where joints form a circle."""
+        for link in self.root.findall("link"):
+            if not self.model.existBodyName(link.get("name", "")):
+                raise RobotDescriptionError(
+                    f"URDF: link {link.get('name')!r} cannot be reached from the root link: "
+                    "joints form a circle"
+                )
 
     def _text(self) -> str:
         return ElementTree.tostring(self.root, encoding="unicode")
