@@ -247,6 +247,7 @@ class _RobotTable:
     urdf: str = ""
     srdf: str = ""
     package_dirs: tuple[str, ...] = ()
+    joints: tuple[str, ...] | None = None
     locked_joints: dict[str, float] = field(default_factory=dict)
     base_placement: tuple[float, float, float, float, float, float, float] | None = None
     acceleration: tuple[float, ...] | None = None
@@ -268,6 +269,7 @@ def _parse_robot(folder: Path, table: _RobotTable) -> Arm:
         table.name or folder / table.urdf,
         srdf=folder / table.srdf if table.srdf else None,
         package_dirs=[folder / item for item in table.package_dirs],
+        joints=table.joints,
         locked_joints=table.locked_joints,
         shapes=table.shapes,
     )

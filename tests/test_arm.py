@@ -1,5 +1,6 @@
 """Arms by name and from URDF files: joints, limits, postures, locked joints, base placement."""
 
+import json
 import re
 import shutil
 from pathlib import Path
@@ -18,6 +19,7 @@ from densarm.errors import (
     RobotDescriptionError,
     UnknownNameError,
 )
+from densarm.robot_description import RobotDescription, data_wheel_folder
 
 DATA = Path(__file__).parent / "data"
 BRANCHING = DATA / "branching.urdf"
@@ -170,11 +172,87 @@ def test_locked_joints_stand_still(branching, data):
     )
 
 
-def test_mimicking_joints_must_be_locked():
-    urdf = BRANCHING.read_text().replace("<axis", '<mimic joint="turn"/><axis', 2)
-    with pytest.raises(RobotDescriptionError, match=r"'turn' mimics.*locked_joints"):
-        load_text(urdf)
-    assert load_text(urdf, locked_joints={"turn": 0.0, "slide": 0.0}).nv == 3
+MIMIC = BRANCHING.read_text().replace(
+    '<axis xyz="0 1 1"/>', '<mimic joint="turn" multiplier="-0.2" offset="0.1"/><axis xyz="0 1 1"/>'
+)
+
+
+def test_mimicking_joints_stand_with_what_they_mimic(branching):
+    with pytest.raises(
+        RobotDescriptionError, match=r"'slide' mimics 'turn', which moves.*locked_j"
+    ):
+        load_text(MIMIC)
+    arm = load_text(MIMIC, locked_joints={"turn": -0.5})
+    assert arm.joint_names == ("left", "right", "wrist")
+    full = branching.configuration([-0.5, 0.2, 0.3, 0.4, 0.5])
+    tool = frame(arm, arm.configuration([0.3, 0.4, 0.5]), "tool")
+    assert tool.isApprox(frame(branching, full, "tool"), 1e-12)
+    assert load_text(MIMIC, locked_joints={"slide": 0.0}).joint_names[0] == "turn"
+
+
+# An arm out of a larger robot
+
+
+@given(data=st.data())
+def test_chosen_joints_move_and_all_others_stand(branching, data):
+    arm = load_arm(BRANCHING, joints=["wrist", "left"], locked_joints={"turn": 0.7})
+    assert arm.joint_names == ("left", "wrist")
+    left, wrist = data.draw(angles_of(arm))
+    full = branching.configuration([0.7, 0.0, left, 0.0, wrist])
+    for name in ("tool", "left_arm"):
+        expected = frame(branching, full, name)
+        assert frame(arm, arm.configuration([left, wrist]), name).isApprox(expected, 1e-12)
+
+
+def test_joints_out_of_their_zero_stand_at_the_limit_next_to_it():
+    urdf = BRANCHING.read_text().replace('lower="-0.1"', 'lower="0.05"')
+    assert load_text(urdf, joints=["left"]).description.locked_joints["slide"] == 0.05
+
+
+def test_one_arm_of_a_robot_with_two():
+    urdf = data_wheel_folder() / "example-robot-data/robots/baxter_description/urdf/baxter.urdf"
+    names = [f"left_{joint}" for joint in ("w2", "s0", "s1", "e0", "e1", "w0", "w1")]
+    arm = load_arm(urdf, joints=names)
+    assert arm.joint_names == (*names[1:], names[0])
+    assert arm.end_effector.startswith("left_hand")
+    assert arm.collision_model.existGeometryName("right_upper_shoulder_0")
+    again = Arm(RobotDescription.from_json(json.loads(json.dumps(arm.description.to_json()))))
+    assert again.joint_names == arm.joint_names
+    with pytest.raises(
+        UnknownNameError, match=r"joint 'left_s9'; did you mean 'left_s1'.*head_pan"
+    ):
+        load_arm(urdf, joints=["left_s9"])
+
+
+@pytest.mark.parametrize(
+    ("robot", "options", "message"),
+    [
+        (BRANCHING, {"joints": []}, "no joint to move"),
+        (BRANCHING, {"joints": ["tool_joint"]}, "unknown joint 'tool_joint'.*known: left, right"),
+        (BRANCHING, {"joints": "left", "locked_joints": {"left": 0}}, r"locked_joints.left = 0"),
+        ("panda", {"joints": ["panda_finger_joint1"]}, "unknown joint.*panda_joint7"),
+    ],
+)
+def test_wrong_choice_of_joints(robot, options, message):
+    with pytest.raises(DensarmError, match=message):
+        load_arm(robot, **options)
+
+
+def test_chosen_joints_of_a_named_arm():
+    arm = load_arm("panda", joints=["panda_joint2", "panda_joint4"])
+    np.testing.assert_array_equal(arm.limits.acceleration, [7.5, 12.5])
+    ready = load_arm("panda").postures["ready"]
+    np.testing.assert_array_equal(arm.postures["ready"], ready[[1, 3]])
+
+
+def test_joints_of_several_axes_can_stand_at_their_neutral_pose():
+    urdf = BRANCHING.read_text().replace("prismatic", "floating")
+    assert load_text(urdf, joints=["left", "wrist"]).nv == 2
+    with pytest.raises(RobotDescriptionError, match=r"'slide' has 6 degrees.*locked at 0 alone"):
+        load_text(urdf, locked_joints={"slide": 0.1})
+
+
+# Locked joints that cannot be
 
 
 @pytest.mark.parametrize(
@@ -261,6 +339,15 @@ def test_postures_are_configurations():
             arm.check_configuration("configuration", q)
             assert (arm.angles(q) >= arm.limits.lower).all()
             assert (arm.angles(q) <= arm.limits.upper).all()
+
+
+def test_neutral_is_zero_or_a_tenth_of_the_range_from_the_limits(branching):
+    np.testing.assert_array_equal(branching.angles(branching.postures["neutral"]), np.zeros(5))
+    panda = load_arm("panda").postures["neutral"]
+    limits = load_arm("panda").limits
+    expected = (0.9 * limits.upper + 0.1 * limits.lower)[3]
+    np.testing.assert_allclose(panda[[0, 1, 2, 3]], [0, 0, 0, expected], rtol=1e-12)
+    assert panda[5] > limits.lower[5] + 0.1
 
 
 def test_wrong_configurations():
