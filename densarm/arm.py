@@ -29,8 +29,8 @@ _FARTHEST = 1e6  # [rad or m], stands for no limit
 class Arm:
     """A robot arm: a chain or tree of revolute, continuous and prismatic joints.
 
-    `postures` are those that the robot comes with, and ``neutral``: every joint at zero, or as
-    near to it as a tenth of its range from the limits allows.
+    `postures` are those that the robot comes with, and ``neutral`` where it touches nothing: every
+    joint at zero, or as near to it as a tenth of its range from the limits allows.
 
     Args:
         description: URDF, SRDF and what else the models are built from.
@@ -51,9 +51,8 @@ class Arm:
         self.idx_q: NDArray[np.int64] = np.array([joint.idx_q for joint in joints])
         self.is_circle: NDArray[np.bool_] = np.array([joint.nq == 2 for joint in joints])
         self.limits: JointLimits = joint_limits(self.model, description.acceleration)
-        self.end_effector_id: int = self._end_effector()
-        """Index of the frame whose path is drawn."""
-        self.end_effector: str = self.model.frames[self.end_effector_id].name
+        self.end_effector_frame: int = self._end_effector_frame()
+        self.end_effector: str = self.model.frames[self.end_effector_frame].name
         self.postures: dict[str, Array] = self._postures()
 
     @cached_property
@@ -171,16 +170,17 @@ class Arm:
         v = finite_vector("velocity", v, self.nv)
         return np.array(pin.nonLinearEffects(self.model, self.data, q, v))
 
-    def _end_effector(self) -> int:
+    def _end_effector_frame(self) -> int:
+        """Return the index of the end effector's frame: the link, where a joint shares its name."""
         frames = list(self.model.frames)
         name = self.description.end_effector
         if name is None:
             last = self.model.njoints - 1
             return max(k for k, frame in enumerate(frames) if frame.parentJoint == last)
-        if not self.model.existFrame(name):
+        named = [k for k, frame in enumerate(frames) if frame.name == name]
+        if not named:
             raise UnknownNameError("end-effector frame", name, [frame.name for frame in frames])
-        # A link and its joint may share a name; the link's frame comes after the joint's.
-        return max(k for k, frame in enumerate(frames) if frame.name == name)
+        return max(named, key=lambda k: bool(frames[k].type == pin.FrameType.BODY))
 
     def _postures(self) -> dict[str, Array]:
         postures: dict[str, Array] = {}
@@ -189,13 +189,19 @@ class Arm:
                 postures[name] = self.configuration([positions[j] for j in self.joint_names])
         for name, angles in self.description.postures.items():
             postures[name] = self.configuration(angles)
-        postures.setdefault("neutral", self.configuration(self._neutral()))
-        return postures
+        neutral = self.configuration(self._neutral())
+        return postures if self._touches_itself(neutral) else {"neutral": neutral, **postures}
 
     def _neutral(self) -> Array:
         lower, upper = np.clip([self.limits.lower, self.limits.upper], -_FARTHEST, _FARTHEST)
         room = _NEUTRAL_ROOM * (upper - lower)
         return np.asarray(np.clip(0.0, lower + room, upper - room))
+
+    def _touches_itself(self, q: Array) -> bool:
+        geometry = self.collision_model
+        return bool(
+            pin.computeCollisions(self.model, self.data, geometry, geometry.createData(), q, True)
+        )
 
 
 def load_arm(

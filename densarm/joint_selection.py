@@ -6,8 +6,9 @@ from dataclasses import replace
 import numpy as np
 
 from densarm.errors import InvalidValueError, UnknownNameError
-from densarm.locked_joints import locked_positions, mimicked_joints
+from densarm.locked_joints import mimicking_joints
 from densarm.robot_description import RobotDescription
+from densarm.robot_models import joint_names
 from densarm.urdf import Urdf
 from densarm.validation import finite_tuple
 
@@ -29,8 +30,8 @@ def without_joints(description: RobotDescription, locked: Mapping[str, float]) -
     given, postures = description.acceleration, description.postures
     if given is None and not postures:
         return changed
-    remaining = _moving_joints(changed)
-    kept = [i for i, name in enumerate(_moving_joints(description)) if name in remaining]
+    remaining = joint_names(changed)
+    kept = [i for i, name in enumerate(joint_names(description)) if name in remaining]
     return replace(
         changed,
         acceleration=None if given is None else tuple(given[i] for i in kept),
@@ -63,7 +64,7 @@ def only_joints(
     others = {
         name: _neutral(urdf, name)
         for name in names
-        if name not in joints and name not in mimicked_joints(urdf)
+        if name not in joints and name not in mimicking_joints(urdf)
     }
     return without_joints(description, {**others, **locked})
 
@@ -74,9 +75,3 @@ def _neutral(urdf: Urdf, name: str) -> float:
         return 0.0
     limits = urdf.model.lowerPositionLimit[joint.idx_q], urdf.model.upperPositionLimit[joint.idx_q]
     return float(np.clip(0.0, *limits))
-
-
-def _moving_joints(description: RobotDescription) -> list[str]:
-    urdf = Urdf(description)
-    locked = locked_positions(urdf, description.locked_joints)
-    return [name for name in list(urdf.model.names)[1:] if name not in locked]

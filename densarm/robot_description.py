@@ -8,11 +8,13 @@ from pathlib import Path
 from typing import Any
 
 from densarm.errors import DensarmError, FileContentError, RobotDescriptionError
-from densarm.shapes import SHAPES
 from densarm.validation import one_of
 
 DATA_WHEEL = "example-robot-data"
 """Prefix ``example-robot-data:`` of a path inside that wheel's folder of robots."""
+
+SHAPES = ("hull", "capsule")
+"""What stands for collision geometry: convex hulls, or the smallest capsule around each."""
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ import numpy as np
 import pinocchio as pin
 
 from densarm.errors import RobotDescriptionError
-from densarm.locked_joints import lock_joints, locked_positions
+from densarm.locked_joints import lock_joints, locked_positions, refuse_mimics
 from densarm.robot_description import RobotDescription
 from densarm.self_collision import add_self_collision_pairs
 from densarm.shapes import differentiable_geometry
@@ -65,11 +65,23 @@ def build_visual_model(description: RobotDescription) -> pin.GeometryModel:
     return _parse(description, pin.GeometryType.VISUAL)[1]
 
 
+def joint_names(description: RobotDescription) -> list[str]:
+    """Return the names of the joints that the arm keeps, in Pinocchio's order.
+
+    Raises:
+        RobotDescriptionError: the URDF cannot be used.
+    """
+    urdf = Urdf(description)
+    locked = locked_positions(urdf, description.locked_joints)
+    return [name for name in list(urdf.model.names)[1:] if name not in locked]
+
+
 def _parse(
     description: RobotDescription, kind: pin.GeometryType
 ) -> tuple[pin.Model, pin.GeometryModel]:
     urdf = Urdf(description)
     locked = locked_positions(urdf, description.locked_joints)
+    refuse_mimics(urdf, locked)
     model, geometry = lock_joints(urdf.model, urdf.geometry(kind), locked)
     placement = finite_vector("base_placement", description.base_placement, 7)
     placement[3:] = unit_quaternion("base_placement orientation", placement[3:])
@@ -108,7 +120,7 @@ def _immovable(model: pin.Model, joint: pin.JointModel) -> str:
     if joint.nq == 2 or low < high:
         return ""
     if low == high:
-        return f"cannot move, as both its limits are {low:g}: widen them, or lock it"
+        return f"cannot move, as both its limits are {low:g}: widen them, make it continuous, or lock it"
     return f"has a lower limit {low:g} above its upper limit {high:g}"
 
 
@@ -126,7 +138,7 @@ def _require_inertia(model: pin.Model) -> None:
             name = list(model.names)[1:][int(np.flatnonzero(~enough)[-1])]
             raise RobotDescriptionError(
                 f"joint {name!r} moves no mass, or an inertia that is not positive, so the mass "
-                "matrix is singular: give the links that it moves an <inertial> with their mass"
+                "matrix is singular: give its links an <inertial> with their mass, or lock it"
             )
 
 

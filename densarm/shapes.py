@@ -11,9 +11,6 @@ from densarm.arrays import Array
 from densarm.errors import RobotDescriptionError
 from densarm.fitted_capsule import fitted_capsule
 
-SHAPES = ("hull", "capsule")
-"""Shapes of an arm: convex hulls, or around each hull the smallest capsule."""
-
 CYLINDER_SIDES = 64
 """Sides of the prism that stands for a cylinder; it exceeds the radius by 0.12 %."""
 
@@ -76,7 +73,7 @@ def differentiable_geometry(
     Args:
         model: the arm's model, whose frames name the links.
         geometry: its collision geometry as the URDF gives it.
-        shapes: one of `SHAPES`.
+        shapes: "capsule" puts the smallest capsule around each hull; "hull" leaves them.
 
     Raises:
         RobotDescriptionError: a shape of another kind (ellipsoid, cone, plane, ...), of a size

@@ -15,6 +15,9 @@ from densarm.robot_description import RobotDescription, parse_robot_xml, resolve
 
 T = TypeVar("T")
 
+# Reads a file again once it has changed. OBB is the cheapest tree whose vertices Python can read.
+_MESHES = coal.CachedMeshLoader(coal.BV_OBB)
+
 _ELEMENT = {pin.GeometryType.COLLISION: "collision", pin.GeometryType.VISUAL: "visual"}
 
 
@@ -45,7 +48,9 @@ class Urdf:
         element = _ELEMENT[kind]
         _resolve_meshes(self.root, element, self._folders)
         text = self._text()
-        geometry = _from_urdf(lambda: pin.buildGeomFromUrdfString(self.model, text, kind))
+        geometry = _from_urdf(
+            lambda: pin.buildGeomFromUrdfString(self.model, text, kind, mesh_loader=_MESHES)
+        )
         for item in geometry.geometryObjects:
             if item.name in self._capsules[element] and isinstance(item.geometry, coal.Cylinder):
                 item.geometry = coal.Capsule(item.geometry.radius, 2.0 * item.geometry.halfLength)

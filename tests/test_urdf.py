@@ -1,10 +1,12 @@
 """What a URDF may write: mesh formats and paths, capsules; and what is refused, in one line."""
 
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import coal
 import numpy as np
+import pinocchio as pin
 import pytest
 
 from densarm.arm import Arm
@@ -144,6 +146,9 @@ def test_links_and_joints_of_one_name():
     text = TEXT.replace('name="tool_joint"', 'name="tool"').replace('name="wrist"', 'name="blade"')
     arm = arm_of(text)
     assert (arm.end_effector, arm.joint_names[-1]) == ("tool", "blade")
+    assert arm.model.frames[arm.end_effector_frame].type == pin.FrameType.BODY
+    description = replace(arm.description, locked_joints={"blade": 1.0})
+    assert Arm(description).joint_names == ("turn", "slide", "left", "right")
 
 
 CHANGES = {
@@ -169,3 +174,8 @@ def test_what_is_refused(change, capfd):
         arm_of(TEXT.replace(old, new))
     assert "\n" not in str(raised.value)
     assert capfd.readouterr() == ("", "")
+
+
+def test_neutral_is_no_posture_where_it_touches():
+    assert "neutral" in arm_of(TEXT).postures
+    assert "neutral" not in arm_of(TEXT.replace('radius="0.07"', 'radius="0.3"')).postures

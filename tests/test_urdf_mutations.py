@@ -119,7 +119,7 @@ def test_mutants_work_or_are_refused_in_one_line(capfd: pytest.CaptureFixture[st
         assert result
         assert "\n" not in result
     else:
-        q = result.postures["neutral"]
+        q = result.configuration(np.zeros(result.nv))
         sample = Clearance(result, SCENE).evaluate(q)
         assert np.isfinite(sample.distance).all()
         assert np.isfinite(sample.gradient).all()

@@ -164,7 +164,7 @@ class MeshcatPlayer:
         return list(self._data.oMi)
 
     def _end_effector(self, q: Array) -> Array:
-        frame = self.arm.model.frames[self.arm.end_effector_id]
+        frame = self.arm.model.frames[self.arm.end_effector_frame]
         poses = self._poses(q)
         return np.array((poses[frame.parentJoint] * frame.placement).translation)
 
