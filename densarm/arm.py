@@ -12,12 +12,13 @@ from numpy.typing import ArrayLike, NDArray
 
 from densarm.arrays import Array
 from densarm.catalogue import robot_description, robot_names
+from densarm.cut_subtrees import without_subtrees
 from densarm.errors import InvalidValueError, UnknownNameError
 from densarm.joint_limits import JointLimits, joint_limits
 from densarm.joint_selection import only_joints, without_joints
 from densarm.robot_description import RobotDescription, read_text
 from densarm.robot_models import build_models, build_visual_model
-from densarm.self_collision import srdf_postures
+from densarm.self_collision import ExcludedPair, srdf_postures
 from densarm.validation import finite_vector
 
 __all__ = ["Arm", "JointLimits", "load_arm"]
@@ -42,7 +43,8 @@ class Arm:
     def __init__(self, description: RobotDescription) -> None:
         self.description = description
         self.name = description.name
-        self.model, self.collision_model, self._mesh_files = build_models(description)
+        self.model, self.collision_model, excluded, self._mesh_files = build_models(description)
+        self.excluded_pairs: tuple[ExcludedPair, ...] = excluded
         self.data = self.model.createData()
         self.nq: int = self.model.nq
         self.nv: int = self.model.nv
@@ -211,6 +213,7 @@ def load_arm(
     package_dirs: Iterable[str | Path] = (),
     joints: Iterable[str] | None = None,
     locked_joints: Mapping[str, float] | None = None,
+    cut_joints: Iterable[str] = (),
     base_placement: pin.SE3 | None = None,
     shapes: str = "hull",
 ) -> Arm:
@@ -226,12 +229,14 @@ def load_arm(
         joints: exact URDF names of the joints that make the arm, in any order: all others are
             locked, at zero or at the limit next to it; None for every joint.
         locked_joints: exact URDF joint name to position [rad or m], which may lie outside limits.
+        cut_joints: exact URDF names of joints, fixed ones too, that are taken off the arm with all
+            that they carry, e.g. a gripper.
         base_placement: pose of the base in the world; gravity and obstacles stay.
         shapes: "hull" for the convex hulls of the collision geometry, or "capsule" for the
             smallest capsule around each of them: larger, but distances cost less.
 
     Raises:
-        UnknownNameError: no such robot, joint, or link of the SRDF.
+        UnknownNameError: no such robot, joint to move, lock or cut at, or link of the SRDF.
         InvalidValueError: a locked position or base placement that is not finite, a locked joint
             that shall be in the arm, or shapes of another name.
         FileContentError: a file that cannot be read.
@@ -246,6 +251,8 @@ def load_arm(
         raise UnknownNameError("robot", robot, [*robot_names(), "the path of a .urdf file"])
     description = replace(description, shapes=shapes)
     description = _with_options(description, srdf, package_dirs, base_placement)
+    if cut := [cut_joints] if isinstance(cut_joints, str) else list(cut_joints):
+        description = without_subtrees(description, cut)
     if joints is not None:
         chosen = (joints,) if isinstance(joints, str) else tuple(joints)
         return Arm(only_joints(description, chosen, locked_joints or {}))

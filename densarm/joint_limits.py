@@ -31,7 +31,11 @@ class JointLimits:
 
 
 def joint_limits(model: pin.Model, acceleration: tuple[float, ...] | None) -> JointLimits:
-    """Return the limits of an arm's joints.
+    """Return the limits of an arm's joints, and defaults where a URDF has none.
+
+    Acceleration is 10 rad/s² or m/s², since a URDF cannot say. Velocity and effort are infinite
+    where the URDF has no limit, zero, or 1e12 and more: then the others bound the motion. A
+    continuous joint has no position limits, whatever the URDF writes.
 
     Args:
         model: the arm, of joints with one degree of freedom each.

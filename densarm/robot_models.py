@@ -10,7 +10,7 @@ import pinocchio as pin
 from densarm.errors import RobotDescriptionError
 from densarm.locked_joints import lock_joints, locked_positions, refuse_mimics
 from densarm.robot_description import RobotDescription
-from densarm.self_collision import add_self_collision_pairs
+from densarm.self_collision import ExcludedPair, add_self_collision_pairs
 from densarm.shapes import differentiable_geometry
 from densarm.urdf import Urdf
 from densarm.validation import finite_vector, unit_quaternion
@@ -25,6 +25,8 @@ class RobotModels(NamedTuple):
 
     model: pin.Model
     collision: pin.GeometryModel
+    excluded_pairs: tuple[ExcludedPair, ...]
+    """The pairs of shapes that it leaves out."""
     mesh_files: dict[str, Path]
     """The collision meshes that were read, by their path from the folder that holds them all."""
 
@@ -49,8 +51,8 @@ def build_models(description: RobotDescription) -> RobotModels:
         )
     files = _mesh_files(collision)
     collision = differentiable_geometry(model, collision, description.shapes)
-    add_self_collision_pairs(model, collision, description.srdf)
-    return RobotModels(model, collision, files)
+    excluded = add_self_collision_pairs(model, collision, description.srdf)
+    return RobotModels(model, collision, excluded, files)
 
 
 def build_visual_model(description: RobotDescription) -> pin.GeometryModel:
@@ -120,7 +122,7 @@ def _immovable(model: pin.Model, joint: pin.JointModel) -> str:
     if joint.nq == 2 or low < high:
         return ""
     if low == high:
-        return f"cannot move, as both its limits are {low:g}: widen them, make it continuous, or lock it"
+        return f"cannot move, as both its limits are {low:g}: widen them or lock it"
     return f"has a lower limit {low:g} above its upper limit {high:g}"
 
 

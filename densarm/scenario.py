@@ -249,6 +249,7 @@ class _RobotTable:
     package_dirs: tuple[str, ...] = ()
     joints: tuple[str, ...] | None = None
     locked_joints: dict[str, float] = field(default_factory=dict)
+    cut_joints: tuple[str, ...] = ()
     base_placement: tuple[float, float, float, float, float, float, float] | None = None
     acceleration: tuple[float, ...] | None = None
     shapes: str = "hull"
@@ -271,6 +272,7 @@ def _parse_robot(folder: Path, table: _RobotTable) -> Arm:
         package_dirs=[folder / item for item in table.package_dirs],
         joints=table.joints,
         locked_joints=table.locked_joints,
+        cut_joints=table.cut_joints,
         shapes=table.shapes,
     )
     changes: dict[str, Any] = {}

@@ -3,6 +3,7 @@
 import json
 import re
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -250,6 +251,15 @@ def test_joints_of_several_axes_can_stand_at_their_neutral_pose():
     assert load_text(urdf, joints=["left", "wrist"]).nv == 2
     with pytest.raises(RobotDescriptionError, match=r"'slide' has 6 degrees.*locked at 0 alone"):
         load_text(urdf, locked_joints={"slide": 0.1})
+
+
+def test_a_joint_and_a_link_of_one_name():
+    urdf = BRANCHING.read_text().replace('"right_arm"', '"wrist"')
+    arm = load_text(urdf, locked_joints={"wrist": 0.0})
+    assert arm.joint_names == ("turn", "slide", "left", "right")
+    description = replace(arm.description, end_effector="wrist")
+    frame = Arm(description).model.frames[Arm(description).end_effector_frame]
+    assert (frame.name, frame.type) == ("wrist", pin.FrameType.BODY)
 
 
 # Locked joints that cannot be

@@ -55,5 +55,5 @@ def test_scenario_file():
 
 
 def test_every_command_is_in_the_table():
-    for name in ("list", "run", "view", "verify", "bench step"):
+    for name in ("list", "run", "view", "verify", "bench step", "bench random"):
         assert f"| `densarm {name}" in README

@@ -7,6 +7,7 @@ import pytest
 
 from densarm.arm import Arm, load_arm
 from densarm.robot_description import RobotDescription
+from densarm.self_collision import Exclusion
 
 DATA = Path(__file__).parent / "data"
 
@@ -34,14 +35,22 @@ APART = (
 )
 
 
+def left_out(arm: Arm, reason: Exclusion) -> set[frozenset[str]]:
+    return {frozenset(pair.shapes) for pair in arm.excluded_pairs if pair.reason == reason}
+
+
 def test_neighbours_are_left_out():
     arm = load_arm(DATA / "branching.urdf")
     assert named_pairs(arm) == expected(*APART, ("left_arm", "right_arm"))
+    assert expected(("base", "column"), ("right_arm", "blade")) < left_out(
+        arm, Exclusion.NEIGHBOURS
+    )
 
 
 def test_srdf_disables_pairs():
     arm = load_arm(DATA / "branching.urdf", srdf=DATA / "branching.srdf")
     assert named_pairs(arm) == expected(*APART)
+    assert left_out(arm, Exclusion.SRDF) == expected(("left_arm", "right_arm"))
 
 
 def test_panda_srdf_leaves_pairs_that_can_collide():
@@ -78,7 +87,9 @@ def test_pairs_that_always_collide_are_left_out():
     assert named_pairs(arm_with_collar(0.1)) == expected(
         ("base", "two"), ("base", "three"), ("one", "three")
     )
-    assert named_pairs(arm_with_collar(0.95)) == expected(("base", "two"), ("base", "three"))
+    collared = arm_with_collar(0.95)
+    assert named_pairs(collared) == expected(("base", "two"), ("base", "three"))
+    assert left_out(collared, Exclusion.ALWAYS) == expected(("one", "three"))
     assert named_pairs(arm_with_collar(0.85)) == named_pairs(arm_with_collar(0.1))
 
 

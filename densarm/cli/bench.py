@@ -17,6 +17,7 @@ def bench() -> None:
     \b
     Example:
       densarm bench step --arm panda --shapes hull --pairs 64 --json step.json
+      densarm bench random --arm ur5 --problems 50 --jobs 2 --json random.json
     """  # noqa: D301
 
 
@@ -59,4 +60,48 @@ def step(arm: str, shapes: str, pairs: int, json: Path | None) -> int:
     click.echo(f"bare calls         {result.bare_us:.1f} µs")
     click.echo(f"ratio              {result.ratio:.2f}")
     click.echo(f"pairs              {result.pairs}")
+    return ExitStatus.SUCCESS
+
+
+@bench.command("random")
+@click.option("--arm", default="panda", show_default=True, help="A name of `densarm list`.")
+@click.option(
+    "--problems",
+    type=click.IntRange(min=1),
+    default=50,
+    show_default=True,
+    help="Number of problems.",
+)
+@click.option(
+    "--seed",
+    type=click.IntRange(min=0),
+    default=0,
+    show_default=True,
+    help="Seed of starts, goals and the planner.",
+)
+@click.option("--jobs", type=click.IntRange(min=1), default=1, show_default=True, help="Processes.")
+@output_option("--json", "FILE", "Write every problem's result and the figures as JSON.")
+def random(arm: str, problems: int, seed: int, jobs: int, json: Path | None) -> int:
+    """Move an arm between random configurations, with nothing but itself in its way.
+
+    Starts and goals are drawn evenly within the position limits, continuous joints from a whole
+    turn, and touch nothing. Each problem is planned, run as a torque-driven closed loop, and
+    proved.
+
+    The exit status is 0 when all problems were run, whatever was reached.
+
+    \b
+    Example:
+      densarm bench random --arm ur5 --problems 50 --jobs 2 --json random.json
+    """  # noqa: D301
+    with progress() as report:
+        report("loading")
+        from densarm.bench.problem import random_problems
+        from densarm.bench.problem_results import run_problems
+        from densarm.cli.problem_table import print_problems
+
+        results = run_problems(random_problems(arm, problems, seed), jobs, report)
+        if json:
+            write_json(json, results.to_json())
+    print_problems(results)
     return ExitStatus.SUCCESS

@@ -2,7 +2,7 @@
 
 import click
 
-from densarm.catalogue import read_toml, robot_names, scenario_paths
+from densarm.catalogue import robot_names, scenario_paths
 from densarm.cli.exit_status import ExitStatus
 
 
@@ -10,16 +10,37 @@ from densarm.cli.exit_status import ExitStatus
 def list_known() -> int:
     """List the robots and scenarios that come with densarm.
 
+    Pairs are the geometry pairs whose distances are computed, of the robot with itself and with
+    the scenario's obstacles. Two links that move against each other are left out where they are
+    neighbours, where the robot's SRDF says so, and where they always collide; in Python,
+    `load_arm(name).excluded_pairs` tells which and why.
+
     \b
     Example:
       densarm list
     """  # noqa: D301
-    scenarios = {name: read_toml(path) for name, path in scenario_paths().items()}
-    width = max(len(name) for name in [*robot_names(), *scenarios]) + 2
+    from densarm.arm import load_arm
+    from densarm.clearance import Clearance
+    from densarm.scenario import load_scenario
+
+    robots, scenarios = robot_names(), scenario_paths()
+    name_width = max(map(len, [*robots, *scenarios])) + 2
+    robot_width = max(map(len, robots)) + 2
+    # Printed row by row, since the meshes of all robots take seconds to load.
     click.echo("Robots, for load_arm and [robot] name:")
-    for name in robot_names():
-        click.echo(f"  {name}")
+    click.echo(f"  {'':<{name_width}}joints  self pairs  left out")
+    for name in robots:
+        arm = load_arm(name)
+        own, left_out = len(arm.collision_model.collisionPairs), len(arm.excluded_pairs)
+        click.echo(f"  {name:<{name_width}}{arm.nv:>6}  {own:>10}  {left_out:>8}")
     click.echo("\nScenarios, for densarm run:")
-    for name, data in scenarios.items():
-        click.echo(f"  {name:<{width}}{data.get('title', '')}")
+    click.echo(f"  {'':<{name_width}}{'robot':<{robot_width}}joints  self pairs  others  task")
+    for name in scenarios:
+        scenario = load_scenario(name)
+        arm = scenario.arm
+        own = len(arm.collision_model.collisionPairs)
+        others = Clearance(arm, scenario.scene).n_pairs - own
+        counts = f"{arm.nv:>6}  {own:>10}  {others:>6}"
+        row = f"  {name:<{name_width}}{arm.name:<{robot_width}}{counts}  {scenario.title}"
+        click.echo(row)
     return ExitStatus.SUCCESS

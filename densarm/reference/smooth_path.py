@@ -10,8 +10,9 @@ from densarm.swept_check import SweptCheck, SweptVerdict
 _DEGREE = 3
 _WIDEST = 0.8  # [rad] between control points at first
 _HALVINGS = 9
-_SAMPLE = 0.01  # [rad] at most between the samples that the proof uses
+_SAMPLE = 0.01  # [rad] at most between the samples that the proof uses at first
 _PARTS = 4  # at least, that each polynomial piece is sampled in
+_DOUBLINGS = 5  # of the samples; the spline's departure from its chords falls with their square
 
 
 class SmoothPath:
@@ -72,8 +73,21 @@ def _spline(length: Array, corner: Array, count: int) -> SmoothPath:
 def _is_clear(
     check: SweptCheck, bound: SweptBound, path: SmoothPath, origin: Array, q0: Array, length: float
 ) -> bool:
+    """Return whether the path is proved clear, sampled ever finer until that is decided."""
+    pieces = len(np.unique(path.knots)) - 1
+    parts = max(_PARTS, int(np.ceil(length / pieces / _SAMPLE)))
+    for doubling in range(_DOUBLINGS):
+        verdict = _verdict(check, bound, path, origin, q0, parts * 2**doubling)
+        if verdict != SweptVerdict.UNDECIDED:
+            break
+    return verdict == SweptVerdict.CLEAR
+
+
+def _verdict(
+    check: SweptCheck, bound: SweptBound, path: SmoothPath, origin: Array, q0: Array, parts: int
+) -> SweptVerdict:
+    """Return what the swept check says of the path, each polynomial piece sampled in parts."""
     pieces = np.unique(path.knots)
-    parts = max(_PARTS, int(np.ceil(length / (len(pieces) - 1) / _SAMPLE)))
     at = np.arange(parts * (len(pieces) - 1) + 1) / parts
     s = np.interp(at, np.arange(len(pieces)), pieces)
     q = bound.arm.integrate(q0, path(s) - origin)
@@ -81,4 +95,4 @@ def _is_clear(
     curvature = np.abs(path(s, 2))
     largest = np.maximum(curvature[:-1], curvature[1:])
     departure = largest / 8.0 * np.diff(s)[:, np.newaxis] ** 2
-    return check.check(q, departure).verdict == SweptVerdict.CLEAR
+    return check.check(q, departure).verdict

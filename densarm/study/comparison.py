@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from densarm.arrays import Array
+from densarm.clear_configurations import clear_configurations
 from densarm.clearance import Clearance
 from densarm.closed_loop import Drive, OnProgress, run_closed_loop
 from densarm.errors import UnknownNameError
@@ -14,7 +15,6 @@ from densarm.guides.guide import NoPath
 from densarm.outcome import Outcome
 from densarm.scenario import Scenario
 from densarm.study.methods import METHODS
-from densarm.study.starts import random_starts
 from densarm.study.timed_controller import TimedController
 from densarm.trajectory import Trajectory
 from densarm.validation import positive_integer
@@ -148,8 +148,9 @@ def compare(
             raise UnknownNameError("method", name, METHODS)
     scenario = replace(scenario, seed=scenario.seed if seed is None else seed)
     clearance = Clearance(scenario.arm, scenario.scene)
-    others = random_starts(
-        scenario, clearance, positive_integer("starts", starts) - 1, scenario.seed
+    room = scenario.control.margin + scenario.control.path_margin
+    others = clear_configurations(
+        clearance, positive_integer("starts", starts) - 1, scenario.seed, room
     )
     results = []
     for name in dict.fromkeys(methods):

@@ -1,11 +1,12 @@
 import json
+import shutil
 import subprocess
 import sys
 
 import click
 import pytest
 
-from densarm.catalogue import robot_names, scenario_paths
+from densarm.catalogue import robot_names, robots_folder, scenario_paths
 from densarm.cli.application import application
 from densarm.cli.run import run
 from densarm.scenario import GuideKind
@@ -43,17 +44,23 @@ def test_without_arguments_it_prints_the_help(command):
     assert command() == command("--help")
 
 
-def test_list_names_robots_and_scenarios_with_titles(command):
+def test_list_names_robots_and_scenarios_with_what_they_hold(command, tmp_path, monkeypatch):
+    for name in ("two_link", "panda"):
+        shutil.copytree(robots_folder() / name, tmp_path / name)
+    monkeypatch.setattr("densarm.catalogue.robots_folder", lambda: tmp_path)
     done = command("list")
-    assert done.status == 0
-    words = done.out.split()
-    assert {*robot_names(), *scenario_paths()} <= set(words)
+    assert (done.status, done.err) == (0, "")
+    rows = {cells[0]: cells[1:] for line in done.out.splitlines() if (cells := line.split())}
+    assert {*robot_names(), *scenario_paths()} <= set(rows)
+    assert rows["two_link"] == ["2", "0", "1"]
+    assert rows["swing_up"][:4] == ["two_link", "2", "0", "4"]
+    assert rows["panda_table"][:4] == ["panda", "7", rows["panda"][1], "48"]
     assert "Swing a two-link arm from hanging to upright between two obstacles" in done.out
 
 
-def test_help_and_list_start_without_heavy_libraries():
+def test_help_starts_without_heavy_libraries():
     script = (
-        "import json, sys; from densarm.cli import main; main(['--help']); main(['list']);"
+        "import json, sys; from densarm.cli import main; main(['--help']);"
         "print(json.dumps(list(sys.modules)))"
     )
     done = subprocess.run(

@@ -52,6 +52,16 @@ def test_follows_the_polyline_where_there_is_no_room(bound):
         assert (bound.slack(arm.configuration(angles)) > 0.0).all()
 
 
+def test_end_that_nothing_but_a_fine_proof_shows_to_be_clear(bound):
+    """A curved path to a goal 10 µm from the margin."""
+    back = 1.0 - np.linspace(0.0, 1.0, 30)[:, np.newaxis]
+    angles = np.array([0.9, 0.3]) - back * [0.6, -0.5] + back**2 * [0.1, 0.4]
+    curve = bound.arm.configurations(angles)
+    slack = np.array([bound.slack(q).min() for q in curve])
+    assert slack.argmin() == len(curve) - 1
+    assert smooth_path(bound.with_margin(slack[-1] - 1e-5), curve) is not None
+
+
 def test_none_where_the_polyline_touches(bound):
     through = np.stack([bound.arm.configuration(angles) for angles in ([0.4, 0.0], [2.0, 0.0])])
     assert smooth_path(bound, through) is None

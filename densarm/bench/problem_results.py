@@ -1,0 +1,137 @@
+"""Problems run one by one or in several processes, and what came of them."""
+
+import signal
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass
+from multiprocessing import get_context
+from typing import Any
+
+import numpy as np
+
+from densarm.bench.problem import Problem
+from densarm.closed_loop import simulate
+from densarm.outcome import Outcome
+from densarm.validation import positive_integer
+
+FAILED = "failed"
+"""The outcome of a run that raised an error instead of ending."""
+
+PERCENTILES = (50, 95, 98)
+
+
+@dataclass(frozen=True)
+class ProblemResult:
+    """How one problem's run ended."""
+
+    scene: str
+    """The set that the problem belongs to."""
+    index: int
+    """Its place in the set."""
+    outcome: str
+    """An `Outcome`, or `FAILED`."""
+    detail: str = ""
+    """What stood in the way, as a phrase."""
+    duration_s: float | None = None
+    """Simulated time [s]; None where nothing ran, as in what follows."""
+    min_clearance_m: float | None = None
+    """Smallest signed distance [m]; None without pairs."""
+    goal_error_rad: float | None = None
+    """Largest joint error at the end [rad or m]."""
+    peak_torque_ratio: float | None = None
+    """Largest torque in units of its limit."""
+    plan_time_s: float | None = None
+    """Wall-clock time of planning [s]."""
+    certified: bool = False
+    """Whether the certificate holds in every part."""
+
+
+@dataclass(frozen=True)
+class ProblemResults:
+    """How the runs of a set of problems ended."""
+
+    results: tuple[ProblemResult, ...]
+
+    @property
+    def total(self) -> int:
+        """Number of problems."""
+        return len(self.results)
+
+    @property
+    def certified(self) -> int:
+        """Number of runs that reached the goal and whose certificate holds in every part."""
+        return sum(r.outcome == Outcome.REACHED and r.certified for r in self.results)
+
+    @property
+    def min_clearance(self) -> float | None:
+        """Smallest signed distance of all runs [m]; None without pairs."""
+        found = [r.min_clearance_m for r in self.results if r.min_clearance_m is not None]
+        return min(found, default=None)
+
+    def count(self, outcome: str) -> int:
+        """Return the number of runs that ended so."""
+        return sum(r.outcome == outcome for r in self.results)
+
+    def percentiles(self, measure: str) -> list[float] | None:
+        """Return the `PERCENTILES` of a measure over the runs that reached the goal, if any."""
+        reached = [getattr(r, measure) for r in self.results if r.outcome == Outcome.REACHED]
+        return np.percentile(reached, PERCENTILES).tolist() if reached else None
+
+    def to_json(self) -> dict[str, Any]:
+        """Return JSON data."""
+        return {
+            "problems": [dict(vars(result)) for result in self.results],
+            "reached": self.count(Outcome.REACHED),
+            "certified": self.certified,
+            "total": self.total,
+            "plan_time_s": self.percentiles("plan_time_s"),
+            "duration_s": self.percentiles("duration_s"),
+            "min_clearance_m": self.min_clearance,
+        }
+
+
+def run_problems(
+    problems: Sequence[Problem], jobs: int = 1, on_progress: Callable[[str], None] = lambda _: None
+) -> ProblemResults:
+    """Plan each problem, run its torque-driven closed loop and prove it.
+
+    Args:
+        problems: what to run.
+        jobs: processes to run them in; 1 for this one.
+        on_progress: told what is being done.
+
+    Returns:
+        How each run ended, in the order of the problems, whatever the number of processes. A run
+        that raises an error counts as failed and stops no other.
+
+    Raises:
+        InvalidValueError: a number of processes below one.
+    """
+    results = []
+    for result in _results(problems, positive_integer("jobs", jobs)):
+        results.append(result)
+        on_progress(f"{len(results)} of {len(problems)} problems run")
+    return ProblemResults(tuple(results))
+
+
+def _results(problems: Sequence[Problem], jobs: int) -> Iterator[ProblemResult]:
+    if jobs == 1:
+        yield from map(run_problem, problems)
+        return
+    # Ctrl-C reaches the whole group of processes; this one alone answers it.
+    pool = ProcessPoolExecutor(
+        jobs, get_context("spawn"), signal.signal, (signal.SIGINT, signal.SIG_IGN)
+    )
+    try:
+        yield from pool.map(run_problem, problems)
+    finally:
+        pool.shutdown(cancel_futures=True)
+
+
+def run_problem(problem: Problem) -> ProblemResult:
+    """Plan a problem, run its closed loop and prove it; an error becomes a result."""
+    try:
+        run = simulate(problem.scenario())
+        return ProblemResult(problem.scene_name, problem.index, detail=run.detail, **run.summary())
+    except (ValueError, ArithmeticError, RuntimeError) as error:
+        return ProblemResult(problem.scene_name, problem.index, FAILED, str(error))

@@ -1,0 +1,62 @@
+"""Problems by the dozen: the same for the same seed, and no run is lost."""
+
+import json
+
+import numpy as np
+import pytest
+
+from densarm.bench.problem import Problem, random_problems
+from densarm.bench.problem_results import FAILED, run_problems
+from densarm.errors import InvalidValueError
+from densarm.scene import Scene, Sphere
+
+
+def test_problems_are_clear_and_more_of_them_begin_with_the_same():
+    few, many = random_problems("two_link", 2, 3), random_problems("two_link", 4, 3)
+    assert few == many[:2]
+    assert [problem.index for problem in many] == [0, 1, 2, 3]
+    assert len({problem.start for problem in many} | {problem.goal for problem in many}) == 8
+    assert (np.abs([problem.start for problem in many]) <= np.pi).all()
+
+
+def test_several_processes_give_what_one_does():
+    """In a scene in which each start touches one more of the balls, so that nothing has to run."""
+    balls = [Sphere(name=f"ball{k}", radius=0.1, position=[0.0, 0.0, -0.5 * k]) for k in range(3)]
+    problems = [
+        Problem("two_link", "balls", k, Scene(balls[:k]), (0.0, 0.0), (3.0, 0.0)) for k in (1, 2, 3)
+    ]
+    one, two = run_problems(problems), run_problems(problems, jobs=2)
+    assert one == two
+    assert [result.index for result in two.results] == [1, 2, 3]
+    assert one.count("infeasible") == 3
+    assert len({result.detail for result in two.results}) == 3
+
+
+def test_figures_of_runs():
+    results = run_problems(random_problems("two_link", 2, 0))
+    assert (results.count("reached"), results.certified, results.total) == (2, 2, 2)
+    data = json.loads(json.dumps(results.to_json(), allow_nan=False))
+    assert (data["reached"], data["certified"], data["total"]) == (2, 2, 2)
+    assert {"scene", "index", "outcome", "certified"} <= set(data["problems"][0])
+    assert data["duration_s"] == sorted(data["duration_s"])
+
+
+def test_a_run_that_fails_stops_no_other(monkeypatch):
+    def fail(scenario):
+        raise ArithmeticError(scenario.name)
+
+    monkeypatch.setattr("densarm.bench.problem_results.simulate", fail)
+    results = run_problems(random_problems("two_link", 2, 0))
+    assert results.count(FAILED) == 2
+    assert results.results[1].detail == "two_link_empty_1"
+    assert (results.certified, results.min_clearance, results.percentiles("duration_s")) == (
+        0,
+        None,
+        None,
+    )
+
+
+@pytest.mark.parametrize(("count", "seed"), [(0, 0), (1, -1)])
+def test_wrong_numbers(count, seed):
+    with pytest.raises(InvalidValueError):
+        random_problems("two_link", count, seed)
