@@ -63,7 +63,7 @@ def free_body(
         shapes: one or more shapes in the body's frame, all of one density.
         freedom: see `Freedom`.
         bounds: lowest and highest position of the body's origin along each slide [m], (2 or 3, 2).
-        name: of the body; its shapes are called name_0, name_1, ... in pairs.
+        name: of the body; pairs call its shapes name_0, name_1, ...
         mass: of the body [kg]; gravity acts along -z.
         speed: velocity limit of every joint [m/s or rad/s].
         acceleration: acceleration limit of every joint [m/s² or rad/s²].
@@ -73,8 +73,8 @@ def free_body(
         turns are continuous. No force is limited.
 
     Raises:
-        InvalidValueError: no shape or one of another kind, an unknown freedom, or a number out of
-            its range.
+        InvalidValueError: no shape or one of another kind, an unknown freedom, a number out of its
+            range, or a name that a joint has.
 
     Source: Siciliano et al., Robotics: Modelling, Planning and Control, 2009, section 2.4.2.
     """
@@ -83,11 +83,13 @@ def free_body(
     parts = _checked_parts(shapes)
     inertia = _inertia(parts, positive("mass", mass))
     contents = dict.fromkeys(["ground", *joints[:-1]], "")
+    if not isinstance(name, str) or not name or name in {"ground", *joints}:
+        raise InvalidValueError("name", name, "a non-empty string, other than 'ground' or a joint")
     if "pitch" in joints:
         largest = float(np.linalg.eigvalsh(inertia.inertia).max())
         carrier = pin.Inertia(0.0, np.zeros(3), _CARRIER_SHARE * largest * np.eye(3))
         contents["yaw"] = _inertial(carrier)
-    contents[name] = _inertial(inertia) + "".join(_collision(part) for part in parts)
+    contents[name] = _inertial(inertia) + _collisions(parts)
     links = [f"<link name={quoteattr(key)}>{text}</link>" for key, text in contents.items()]
     ends = zip(joints, pairwise(contents), strict=True)
     speed = positive("speed", speed)
@@ -161,24 +163,34 @@ def _inertial(inertia: pin.Inertia) -> str:
 _ENTRIES = {"xx": (0, 0), "xy": (0, 1), "xz": (0, 2), "yy": (1, 1), "yz": (1, 2), "zz": (2, 2)}
 
 
-def _collision(part: Any) -> str:
-    """Return the collision elements of a shape; a URDF writes a capsule as three shapes."""
-    match part:
+def _collisions(parts: Scene) -> str:
+    """Return one collision element for each part, then the ends of capsules.
+
+    A URDF writes a capsule as a cylinder and two spheres, which loading it puts together again.
+    """
+    ends = [
+        _collision(part, Sphere(name=part.name, radius=part.radius), z)
+        for part in parts
+        if isinstance(part, Capsule)
+        for z in (-0.5 * part.length, 0.5 * part.length)
+    ]
+    return "".join([*(_collision(part, part, 0.0) for part in parts), *ends])
+
+
+def _collision(part: Obstacle, solid: Any, z: float) -> str:
+    """Return a solid as a collision element, at a height [m] along the z axis of a part."""
+    match solid:
         case Sphere():
-            solids = [(f'<sphere radius="{part.radius!r}"/>', 0.0)]
+            geometry = f'<sphere radius="{solid.radius!r}"/>'
         case Box():
-            solids = [(f'<box size="{_words(part.size)}"/>', 0.0)]
+            geometry = f'<box size="{_words(solid.size)}"/>'
         case _:
-            solids = [(f'<cylinder radius="{part.radius!r}" length="{part.length!r}"/>', 0.0)]
-    if isinstance(part, Capsule):
-        ends = (-0.5 * part.length, 0.5 * part.length)
-        solids += [(f'<sphere radius="{part.radius!r}"/>', z) for z in ends]
+            geometry = f'<cylinder radius="{solid.radius!r}" length="{solid.length!r}"/>'
     pose = obstacle_pose(part)
-    turn = _words(pin.rpy.matrixToRpy(pose.rotation))
-    return "".join(
-        f'<collision><origin xyz="{_words(pose.act(np.array([0.0, 0.0, z])))}" rpy="{turn}"/>'
-        f"<geometry>{solid}</geometry></collision>"
-        for solid, z in solids
+    return (
+        f'<collision><origin xyz="{_words(pose.act(np.array([0.0, 0.0, z])))}" '
+        f'rpy="{_words(pin.rpy.matrixToRpy(pose.rotation))}"/>'
+        f"<geometry>{geometry}</geometry></collision>"
     )
 
 

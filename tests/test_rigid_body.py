@@ -122,6 +122,14 @@ def test_coordinates_are_position_then_yaw_pitch_roll(rigid_body, position, turn
     np.testing.assert_allclose(data.oMi[-1].translation, position, rtol=0, atol=1e-12)
 
 
+def test_shapes_keep_their_order_and_kind(rigid_body):
+    names = [item.name for item in rigid_body.collision_model.geometryObjects]
+    assert sorted(names) == ["body_0", "body_1"]
+    item = rigid_body.collision_model.geometryObjects[names.index("body_1")]
+    assert type(item.geometry).__name__ == "Capsule"
+    np.testing.assert_allclose(item.placement.translation, [0.0, 0.2, 0.0], rtol=0, atol=1e-12)
+
+
 @given(st.tuples(angle, angle, angle), st.integers(0, 2**32 - 1))
 def test_kinetic_energy_is_that_of_the_body(rigid_body, turns, seed):
     q = rigid_body.configuration([0.0, 0.0, 0.0, *turns])
@@ -253,6 +261,7 @@ def test_a_run_through_an_obstacle_is_not_proved_clear():
         ({"bounds": [(0.0, 1.0), (1.0, 1.0)]}, "bounds of y"),
         ({"bounds": [(0.0, np.inf), (0.0, 1.0)]}, "bounds of x"),
         ({"mass": 0.0}, "mass"),
+        ({"name": "x"}, "name"),
         ({"speed": -1.0}, "speed"),
         ({"acceleration": np.nan}, "acceleration"),
     ],
