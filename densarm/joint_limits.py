@@ -19,9 +19,9 @@ class JointLimits:
     """Limits of the joints, each of shape (nv,); infinite where a joint has none."""
 
     lower: Array
-    """Lower position limit [rad or m]; minus infinity on continuous joints."""
+    """Lower position limit [rad or m]; minus infinity on continuous joints and beyond 1e12."""
     upper: Array
-    """Upper position limit [rad or m]; infinity on continuous joints."""
+    """Upper position limit [rad or m]; infinity on continuous joints and beyond 1e12."""
     velocity: Array
     """Velocity limit [rad/s or m/s]; infinite where the URDF writes zero, or 1e12 or more."""
     acceleration: Array
@@ -50,10 +50,11 @@ def joint_limits(model: pin.Model, acceleration: tuple[float, ...] | None) -> Jo
     positive("acceleration", given.min())
     joints = list(model.joints)[1:]
     index = [joint.idx_q for joint in joints]
+    lower, upper = model.lowerPositionLimit[index], model.upperPositionLimit[index]
     is_circle = np.array([joint.nq == 2 for joint in joints])
     return JointLimits(
-        lower=np.where(is_circle, -np.inf, model.lowerPositionLimit[index]),
-        upper=np.where(is_circle, np.inf, model.upperPositionLimit[index]),
+        lower=np.where(is_circle | (lower <= -_UNLIMITED), -np.inf, lower),
+        upper=np.where(is_circle | (upper >= _UNLIMITED), np.inf, upper),
         velocity=_limit_or_infinity(model.upperVelocityLimit),
         acceleration=given,
         effort=_limit_or_infinity(model.upperEffortLimit),

@@ -122,7 +122,8 @@ def _immovable(model: pin.Model, joint: pin.JointModel) -> str:
     if joint.nq == 2 or low < high:
         return ""
     if low == high:
-        return f"cannot move, as both its limits are {low:g}: widen them or lock it"
+        mend = "widen them, make it continuous, or lock it"
+        return f"cannot move, as both its limits are {low:g}: {mend}"
     return f"has a lower limit {low:g} above its upper limit {high:g}"
 
 

@@ -30,7 +30,7 @@ OBSTACLES = {
     "capsule": lambda **pose: Capsule(name="it", radius=0.05, length=0.2, **pose),
     "cylinder": lambda **pose: Cylinder(name="it", radius=0.06, length=0.2, **pose),
 }
-DEPTHS = {"apart": 0.05, "touching": 1e-6, "sunk": -1e-6, "penetrating": -0.01}  # distance [m]
+DEPTHS = {"apart": 0.05, "touching": 1e-6, "sunk": -1e-6, "penetrating": -0.004}  # distance [m]
 
 
 @pytest.fixture(scope="module", params=ARMS)
@@ -132,9 +132,15 @@ def named_obstacles():
     }
 
 
+INERTIAL = (
+    '<inertial><mass value="1"/>'
+    '<inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial>'
+)
+
+
 def single_link(shape: str, axis: str = "0 1 0", kind: str = "revolute", origin: str = "0 0 0"):
     urdf = f"""<robot name="single"><link name="base"/><link name="link">
-      <collision><origin xyz="{origin}"/><geometry>{shape}</geometry></collision></link>
+      {INERTIAL}<collision><origin xyz="{origin}"/><geometry>{shape}</geometry></collision></link>
       <joint name="joint" type="{kind}"><parent link="base"/><child link="link"/>
       <axis xyz="{axis}"/><limit lower="-3" upper="3" effort="1" velocity="1"/></joint></robot>"""
     return Arm(RobotDescription(name="single", urdf=urdf))

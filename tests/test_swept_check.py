@@ -80,11 +80,17 @@ def test_arcs_of_many_samples_are_proved_at_once():
     assert result.evaluations < 20
 
 
+INERTIAL = (
+    '<inertial><mass value="1"/>'
+    '<inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial>'
+)
+
+
 @pytest.fixture(scope="module")
 def orbiting() -> Arm:
     """One joint that takes a ball round in a circle."""
     urdf = f"""<robot name="orbiting"><link name="base"/><link name="link">
-      <collision><origin xyz="{ORBIT} 0 0"/><geometry><sphere radius="{BALL}"/></geometry>
+      {INERTIAL}<collision><origin xyz="{ORBIT} 0 0"/><geometry><sphere radius="{BALL}"/></geometry>
       </collision></link><joint name="joint" type="revolute"><parent link="base"/>
       <child link="link"/><axis xyz="0 0 1"/>
       <limit lower="-9" upper="9" effort="1" velocity="1"/></joint></robot>"""

@@ -119,7 +119,7 @@ def test_ends_on_the_limits_and_on_the_seam_are_allowed(make_arm, make_discs):
 
 
 def test_a_joint_without_an_interval_is_refused(make_arm, make_discs):
-    arm = make_arm("prismatic", "continuous", bound=0.0)
+    arm = make_arm("prismatic", "continuous", bound=1.7e308)
     with pytest.raises(InvalidValueError, match=r"joint 'first'.*lock the joint"):
         PathGuide(arm, make_discs(arm))
 
