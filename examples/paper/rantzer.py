@@ -122,7 +122,7 @@ def draw_shares(shares: dict[tuple[float, float], dict[Gauge, float]], leaks: di
     gauges.set_title("(a) θ = 0: where the condition fails", fontsize=9.5)
     gauges.set_ylabel("share of the sensing region [%]")
     leak.set_ylabel("share of the sensing region, or of the starts [%]")
-    for theta, colour in zip(THETAS, colours, strict=True):
+    for theta, colour in zip(THETAS, colours, strict=False):
         share = [100.0 * shares[theta, alpha][Gauge.DENSITY] for alpha in ALPHAS]
         leak.plot(ALPHAS, share, "-", color=colour, label=f"θ = {theta:g}: condition fails")
         rate = [100.0 * leaks[theta, alpha].rate for alpha in ALPHAS]
