@@ -119,7 +119,8 @@ class EuclideanDensity:
 
 
 def _rows(x: Array) -> Array:
-    return np.ascontiguousarray(x, np.float64).reshape(-1, x.shape[-1])
+    """Return points (..., n) as (N, n), each coordinate contiguous: what numpy is fast on."""
+    return np.asfortranarray(x.reshape(-1, x.shape[-1]), np.float64)
 
 
 @compiled

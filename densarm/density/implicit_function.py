@@ -51,16 +51,21 @@ class Placed:
         factors = np.broadcast_to(np.asarray(scale, np.float64), self.position.shape)
         for factor in factors:
             positive("scale", factor)
-        # Rows of x − p times this are D⁻¹Rᵀ(x − p), and gradients come back by its transpose.
+        # Rows of x − p times this are D⁻¹Rᵀ(x − p); gradients come back by its transpose.
         self._map: Array = _rotation_matrix(rotation, self.position.size) / factors
 
     def __call__(self, x: Array) -> Array:
         """Act as `ImplicitFunction.__call__`."""
-        return self.function((x - self.position) @ self._map)
+        return self.function(self._local(x))
 
     def gradient(self, x: Array) -> Array:
         """Act as `ImplicitFunction.gradient`."""
-        return self.function.gradient((x - self.position) @ self._map) @ self._map.T
+        return self.function.gradient(self._local(x)) @ self._map.T
+
+    def _local(self, x: Array) -> Array:
+        """Return D⁻¹Rᵀ(x − p) in the memory layout of x, which Fortran's order makes fast."""
+        offset = (x - self.position).reshape(-1, x.shape[-1])
+        return (self._map.T @ offset.T).T.reshape(x.shape)
 
 
 @dataclass(frozen=True)

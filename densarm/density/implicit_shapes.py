@@ -48,7 +48,7 @@ class Ellipsoid:
 
     def __call__(self, x: Array) -> Array:
         """Act as `ImplicitFunction.__call__`."""
-        return np.sum((np.array(self.scaling) * x) ** 2, axis=-1) - self.radius**2  # type: ignore[no-any-return]
+        return np.square(x) @ np.square(self.scaling) - self.radius**2
 
     def gradient(self, x: Array) -> Array:
         """Act as `ImplicitFunction.gradient`."""

@@ -78,7 +78,7 @@ def space_axes(axes: Any, extent: Sequence[float], title: str) -> None:
     axes.set_xlim(extent[0], extent[1])
     axes.set_ylim(extent[2], extent[3])
     axes.set_zlim(extent[4], extent[5])
-    axes.set_box_aspect(np.diff(extent)[::2].tolist(), zoom=0.8)  # room for the labels
+    axes.set_box_aspect(np.diff(extent)[::2].tolist(), zoom=0.85)
     axes.set_title(title, fontsize=9.5)
     axes.set_xlabel("$x_1$ [m]")
     axes.set_ylabel("$x_2$ [m]")

@@ -60,24 +60,30 @@ def is_inverse_bump(numbers: dict[str, float | bool]) -> bool:
 
 def draw() -> Figure:
     figure = style.new_figure(9.0, 7.2)
+    upper, lower = figure.subfigures(2)  # the lower, laid out alone, does not crowd the upper
     first, second = style.plane_grid(EXTENT)
     x = np.stack([first, second], axis=-1)
     for column, (name, region) in enumerate(REGIONS.items()):
         psi = bump(region, x)
-        ax = figure.add_subplot(2, 2, 1 + column)
+        ax = upper.add_subplot(1, 2, 1 + column)
         style.plane_axes(ax, EXTENT, f"({'ab'[column]}) Ψ: {name}")
         levels = np.linspace(THETA - 1e-9, 1.0 + THETA + 1e-9, 21)
         filled = ax.contourf(first, second, psi, levels, cmap=style.DENSITY_MAP)
-        figure.colorbar(
-            filled, ax=ax, label="Ψ [–]", shrink=0.85, ticks=[0.1, 0.35, 0.6, 0.85, 1.1]
-        )
+        upper.colorbar(filled, ax=ax, label="Ψ [–]", shrink=0.85, ticks=[0.1, 0.35, 0.6, 0.85, 1.1])
         ax.contour(first, second, region.h(x), [0.0], colors="white", linewidths=1.2)
         ax.contour(first, second, region.s(x), [0.0], colors="black", linestyles="--")
         ax.text(0.0, 0.0, "$h\\leq 0$", color="white", ha="center", va="center")
         ax.text(-2.85, -2.85, "solid: $h=0$, dashed: $s=0$", fontsize=8)
-        space = figure.add_subplot(2, 2, 3 + column, projection="3d")
+        space = lower.add_subplot(1, 2, 1 + column, projection="3d")
         space.plot_surface(
-            first, second, psi, cmap=style.DENSITY_MAP, rcount=60, ccount=60, linewidth=0.0
+            first,
+            second,
+            psi,
+            cmap=style.DENSITY_MAP,
+            rcount=60,
+            ccount=60,
+            linewidth=0.0,
+            rasterized=True,
         )
         style.space_axes(space, (*EXTENT, 0.0, 1.2), f"({'cd'[column]}) the same as a surface")
         space.set_box_aspect((1.0, 1.0, 0.55))

@@ -28,7 +28,7 @@ from densarm.density.implicit_shapes import (
     Torus,
 )
 from densarm.density.navigation_density import DensityParameters
-from densarm.fields.integral_curves import IntegralCurves, integral_curves
+from densarm.fields.integral_curves import CurveParameters, IntegralCurves, integral_curves
 from densarm.outcome import Outcome
 from densarm.simulation.proportion import Proportion
 from densarm.visualization import figure_style as style
@@ -36,6 +36,7 @@ from densarm.visualization.figure_report import FigureReport, figure_arguments
 
 BAR = 0.999  # of the starts, that must reach the goal
 SHOWN = 48  # curves drawn in each picture
+CURVES = CurveParameters(tolerance=1e-3)  # [m]
 
 
 @dataclass(frozen=True)
@@ -147,7 +148,7 @@ def rotation_about_y(degrees: float) -> Array:
 
 
 def angles(first: float, second: float) -> tuple[Array, Array]:
-    u, v = np.meshgrid(np.linspace(0.0, first, 24), np.linspace(0.0, second, 24))
+    u, v = np.meshgrid(np.linspace(0.0, first, 19), np.linspace(0.0, second, 19))
     return u, v
 
 
@@ -175,13 +176,17 @@ def field_of(environment: Environment) -> EuclideanDensity:
     return EuclideanDensity(environment.unsafe, environment.goal, parameters)
 
 
-def rates(environment: Environment, count: int) -> dict[str, dict[str, float]]:
-    """Outcomes from the paper's kind of starts, and from starts all over the free space."""
-    random, field = np.random.default_rng(4), field_of(environment)
+def follow(environment: Environment, count: int) -> IntegralCurves:
+    """Curves from the paper's kind of starts, then from as many all over the free space."""
+    random = np.random.default_rng(4)
     starts = [
         sample(random, count) for sample in (environment.paper_starts, environment.random_starts)
     ]
-    curves = integral_curves(field, np.concatenate(starts))
+    return integral_curves(field_of(environment), np.concatenate(starts), CURVES, record=True)
+
+
+def rates(curves: IntegralCurves) -> dict[str, dict[str, float]]:
+    count = len(curves.outcome) // 2
     return {
         "starts_as_in_the_paper": summary(curves, slice(None, count)),
         "starts_all_over": summary(curves, slice(count, None)),
@@ -203,22 +208,22 @@ def summary(curves: IntegralCurves, part: slice) -> dict[str, float]:
     }
 
 
-def draw(environments: list[Environment]) -> Figure:
-    figure = style.new_figure(10.0, 9.6)
-    for number, environment in enumerate(environments):
+def draw(environments: list[Environment], followed: list[IntegralCurves]) -> Figure:
+    figure = style.new_figure(10.0, 9.2)
+    halves = figure.subfigures(2)  # axes of space, laid out alone, do not crowd those of the plane
+    for number, (environment, curves) in enumerate(zip(environments, followed, strict=True)):
         space = len(environment.goal) == 3
         kind = {"projection": "3d"} if space else {}
-        ax = figure.add_subplot(2, 2, number + 1, **kind)
+        ax = halves[number // 2].add_subplot(1, 2, number % 2 + 1, **kind)
         title = f"({'abcd'[number]}) {environment.name}"
-        field = field_of(environment)
-        starts = environment.paper_starts(np.random.default_rng(1), SHOWN)
-        curves = integral_curves(field, starts, record=True)
+        shown = slice(min(SHOWN, len(curves.paths) // 2))
         if space:
             draw_space(ax, environment, title)
         else:
             draw_plane(ax, environment, title)
-        style.draw_curves(ax, curves.paths, style.outcome_colours(curves.outcome))
-        style.mark_goal(ax, field.goal)
+        style.draw_curves(ax, curves.paths[shown], style.outcome_colours(curves.outcome[shown]))
+        style.mark_goal(ax, np.array(environment.goal))
+        starts = np.array([path[0] for path in curves.paths[shown]])
         ax.plot(*starts.T, ".", color=style.BLACK, markersize=3)
     return figure
 
@@ -232,7 +237,7 @@ def draw_plane(ax: Axes, environment: Environment, title: str) -> None:
 def draw_space(ax: Axes3D, environment: Environment, title: str) -> None:
     style.space_axes(ax, environment.extent, title)
     for surface in environment.surfaces:
-        ax.plot_surface(*surface, color=style.GREY, alpha=0.35, linewidth=0.0)
+        ax.plot_surface(*surface, color=style.GREY, alpha=0.35, linewidth=0.0, rasterized=True)
     ax.view_init(elev=28.0, azim=-62.0)
 
 
@@ -247,13 +252,16 @@ def main(arguments: list[str] | None = None) -> None:
     options = figure_arguments(__doc__, starts=1000, arguments=arguments)
     convex = Ellipsoid((1.0, 1.35), 2.5)
     environments = [four_shapes(convex), maze(), grid_of_spheres(), tori()]
-    numbers = {each.name: rates(each, options.starts) for each in environments}
+    followed = [follow(each, options.starts) for each in environments]
+    numbers = {
+        each.name: rates(curves) for each, curves in zip(environments, followed, strict=True)
+    }
     holds = all(meets_bar(each) for each in numbers.values())
-    follows = four_shapes(Lowered(Bowtie(half_length=2.0, waist=0.25), 1.0))
+    notched = four_shapes(Lowered(Bowtie(half_length=2.0, waist=0.25), 1.0))
     numbers["(a) with the bowtie sensed in a region that follows its notches"] = rates(
-        follows, max(1, options.starts // 5)
+        follow(notched, max(1, options.starts // 5))
     )
-    style.save_figure(draw(environments), options.out, "fig4_complex_environments")
+    style.save_figure(draw(environments, followed), options.out, "fig4_complex_environments")
     FigureReport(
         "Fig. 4",
         "In four complex environments at least 99.9 % of the starts reach the goal and none "

@@ -22,7 +22,7 @@ GOAL = np.array([-9.0, 1.0])  # behind the closed side of the C [m]
 C_SHAPE = CShape(radius=2.2, half_width=0.4, opening=0.0, sharpness=2.0)
 CLOSED_C = CShape(radius=2.6, half_width=0.45, opening=1.3, sharpness=4.0)
 WORLD = Complement(Ball(radius=25.0))  # [m]
-EXTENT = (-12.0, 8.0, -10.0, 10.0)  # [m]
+EXTENT = (-11.0, 6.0, -6.0, 6.0)  # [m]
 SHOWN = 40
 
 
@@ -78,7 +78,7 @@ def covered_share(radius: float) -> float:
 
 
 def draw(numbers: dict[str, dict[str, object]], starts: int) -> Figure:
-    figure = style.new_figure(9.0, 9.4)
+    figure = style.new_figure(9.0, 7.2)
     axes = figure.subplots(2, 2).ravel()
     for letter, ax, (name, field) in zip("abcd", axes, FIELDS.items(), strict=True):
         curves = integral_curves(field, cavity_starts(C_SHAPE, SHOWN), record=True)
@@ -96,7 +96,7 @@ def draw(numbers: dict[str, dict[str, object]], starts: int) -> Figure:
             if outcome != Outcome.REACHED:
                 ax.plot(*ends.T, "X", color=colour, markersize=6, zorder=6, label=str(outcome))
         style.mark_goal(ax, GOAL)
-        ax.legend(loc="lower right")
+        ax.legend(loc="upper right")
     return figure
 
 

@@ -48,7 +48,7 @@ def draw(runs: PointRuns, starts: Array) -> Figure:
     style.draw_curves(plane, paths, style.outcome_colours(runs.outcome[: len(paths)]), width=1.0)
     plane.plot(*starts[: len(paths)].T, ".", color=style.BLACK, markersize=4, label="starts")
     style.mark_goal(plane, GOAL)
-    plane.legend(loc="upper left")
+    plane.legend(loc="lower right")
     shown = int(np.argmax([np.abs(np.diff(path, axis=0)).sum() for path in paths]))
     plane.plot(*paths[shown].T, color=style.VERMILION, linewidth=2.0, zorder=4)
     moving = np.flatnonzero(np.abs(runs.u[:, shown]).max(axis=1) > 0.0)
@@ -64,7 +64,7 @@ def draw(runs: PointRuns, starts: Array) -> Figure:
     traces.set_xlabel("time [s]")
     traces.set_ylabel("control [m/s]")
     traces.set_title("(b) control along the red path", fontsize=9.5)
-    traces.legend(loc="upper right")
+    traces.legend(loc="upper left")
     traces.grid(alpha=0.3)
     return figure
 
