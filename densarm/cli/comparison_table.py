@@ -10,31 +10,36 @@ from rich.text import Text
 from densarm.outcome import Outcome
 from densarm.study.comparison import OUTCOMES, Comparison, MethodResult
 
-_SHOWN = (Outcome.REACHED, Outcome.COLLIDED, Outcome.STUCK, Outcome.TIMED_OUT)
+_SHOWN = {
+    "reach-\ned": Outcome.REACHED,
+    "colli-\nded": Outcome.COLLIDED,
+    "stuck": Outcome.STUCK,
+}
 _COLUMNS = {
     "time\n[s]": ("time_s", 1.0, ".2f"),
     "path\n[rad]": ("path_length_rad", 1.0, ".2f"),
-    "clearance\n[mm]": ("min_clearance_m", 1e3, ".1f"),
+    "clear\n[mm]": ("min_clearance_m", 1e3, ".1f"),
     "effort\n[N²m²s]": ("effort", 1.0, ".0f"),
-    "planning\n[s]": ("plan_time_s", 1.0, ".2f"),
+    "plan\n[s]": ("plan_time_s", 1.0, ".2f"),
     "step\n[µs]": ("step_us", 1.0, ".0f"),
 }
-_WIDTH = 120  # characters, at least, so that no number is cut; a narrow terminal breaks the lines
+_WIDTH = 90  # characters, at least, so that no number is cut; most tables need 80
 
 
 def print_comparison(comparison: Comparison) -> None:
     """Print one row a method: how its runs ended, and the medians of its measures."""
     table = Table(
         title=f"{comparison.scenario}, {comparison.starts} starts, seed {comparison.seed}",
-        caption="Medians: of the step over all runs, else over the runs that reached the goal.",
+        caption="Medians: of the step over all runs, else over the runs that reached the goal.\n"
+        + _tuning(comparison),
         box=SIMPLE,
-        padding=(0, 1, 0, 0),
+        padding=0,
+        show_edge=False,
         title_justify="left",
         caption_justify="left",
     )
     table.add_column("method", no_wrap=True)
-    words = [str(outcome).replace("_", "\n") for outcome in _SHOWN]
-    for heading in (*words, "other", *_COLUMNS):
+    for heading in (*_SHOWN, "else", *_COLUMNS):
         table.add_column(Text(heading), justify="right")
     for result in comparison.methods:
         table.add_row(*_row(result))
@@ -42,8 +47,17 @@ def print_comparison(comparison: Comparison) -> None:
     Console(width=width, highlight=False).print(table)
 
 
+def _tuning(comparison: Comparison) -> str:
+    if comparison.tuning_starts == 0:
+        return "No parameter was tuned."
+    scales = ", ".join(
+        f"{result.parameter} × {result.scale:g} ({result.method})" for result in comparison.methods
+    )
+    return f"Tuned on {comparison.tuning_starts} other starts: {scales}."
+
+
 def _row(result: MethodResult) -> Sequence[str]:
-    shown = [result.count(outcome) for outcome in _SHOWN]
+    shown = [result.count(outcome) for outcome in _SHOWN.values()]
     other = sum(result.count(outcome) for outcome in OUTCOMES) - sum(shown)
     counts = [str(count) for count in (*shown, other)]
     measures = [

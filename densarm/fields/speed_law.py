@@ -21,10 +21,13 @@ class SpeedParameters:
 
     braking_share: float = 0.3
     """Share of the acceleration limits that planned braking uses."""
+    velocity_share: float = 1.0
+    """Share of the velocity limits."""
 
     def __post_init__(self) -> None:
-        if not 0.0 < self.braking_share <= 1.0:
-            raise InvalidValueError("braking_share", self.braking_share, "in (0, 1]")
+        for name in ("braking_share", "velocity_share"):
+            if not 0.0 < getattr(self, name) <= 1.0:
+                raise InvalidValueError(name, getattr(self, name), "in (0, 1]")
 
 
 class SpeedLaw:
@@ -32,7 +35,7 @@ class SpeedLaw:
 
     .. math::
 
-        s = \min\Big\{ \frac{v_i^{max}}{|u_i|},\ \sqrt{2 \beta a \ell},\
+        s = \min\Big\{ \frac{\nu v_i^{max}}{|u_i|},\ \sqrt{2 \beta a \ell},\
         \sqrt{2 \beta a h_k / r_k} \Big\}, \qquad
         a = \min_i \frac{a_i^{max}}{|u_i|}, \quad r_k = \sum_j r_{kj} |u_j|
 
@@ -41,11 +44,12 @@ class SpeedLaw:
 
     Args:
         bound: the swept bound, whose margin is kept.
-        parameters: β.
+        parameters: β and ν.
     """
 
     def __init__(self, bound: SweptBound, parameters: SpeedParameters) -> None:
         self._limits = bound.arm.limits
+        self._velocity_limit = parameters.velocity_share * bound.arm.limits.velocity
         self._lever = bound.lever
         self._margin = bound.margin
         self._parameters = parameters
@@ -64,7 +68,7 @@ class SpeedLaw:
                 distance,
                 self._margin,
                 self._lever,
-                self._limits.velocity,
+                self._velocity_limit,
                 self._limits.acceleration,
                 way_left,
                 self._parameters.braking_share,

@@ -1,4 +1,4 @@
-"""Comparison: every method from every start, under the same distances, margins and seeds."""
+"""Comparison: every method from every start, under the same limits, margins, tuning and seeds."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -11,13 +11,23 @@ from densarm.clear_configurations import clear_configurations
 from densarm.clearance import Clearance
 from densarm.closed_loop import Drive, OnProgress, run_closed_loop
 from densarm.errors import UnknownNameError
+from densarm.fields.speed_law import SpeedParameters
 from densarm.guides.guide import NoPath
 from densarm.outcome import Outcome
+from densarm.reference.timing_parameters import TimingParameters
 from densarm.scenario import Scenario
-from densarm.study.methods import METHODS
+from densarm.study.methods import MAIN_PARAMETERS, METHODS
 from densarm.study.timed_controller import TimedController
 from densarm.trajectory import Trajectory
-from densarm.validation import positive_integer
+from densarm.validation import non_negative_integer, positive_integer
+
+LIMIT_SHARE = 0.9
+"""Share of the velocity, acceleration and torque limits that every method plans with."""
+
+SCALES = (1.0, 0.2, 5.0)
+"""Multiples of the default of its main parameter that tuning tries on every method."""
+
+_TUNING_SEED = 1_000_003  # added to the seed of the starts that are not tuned on
 
 FAILED = "failed"
 """In place of an outcome: the run raised an error."""
@@ -71,6 +81,13 @@ class MethodResult:
 
     method: str
     runs: tuple[MethodRun, ...]
+    scale: float = 1.0
+    """Of its main parameter, as tuning chose it."""
+
+    @property
+    def parameter(self) -> str:
+        """Name of its main parameter."""
+        return MAIN_PARAMETERS[self.method]
 
     def count(self, outcome: str) -> int:
         """Return the number of runs that ended so."""
@@ -90,6 +107,8 @@ class MethodResult:
         """Return JSON data."""
         return {
             "method": self.method,
+            "parameter": self.parameter,
+            "scale": self.scale,
             **{outcome: self.count(outcome) for outcome in OUTCOMES},
             **{measure: self.median(measure) for measure in MEASURES},
             "runs": [run.to_json() for run in self.runs],
@@ -103,6 +122,8 @@ class Comparison:
     scenario: str
     seed: int
     methods: tuple[MethodResult, ...]
+    tuning_starts: int
+    """Number of other starts that the main parameters were tuned on."""
 
     @property
     def starts(self) -> int:
@@ -116,6 +137,8 @@ class Comparison:
             "starts": self.starts,
             "scenario": self.scenario,
             "seed": self.seed,
+            "tuning_starts": self.tuning_starts,
+            "limit_share": LIMIT_SHARE,
         }
 
 
@@ -124,15 +147,23 @@ def compare(
     methods: Sequence[str] = tuple(METHODS),
     starts: int = 5,
     seed: int | None = None,
+    tuning_starts: int = 3,
     on_progress: OnProgress = lambda _: None,
 ) -> Comparison:
     """Run methods from the same starts to the scenario's goal.
+
+    All get the same arm, scene, margin, time step, time limit and gains, and plan with
+    `LIMIT_SHARE` of the velocity, acceleration and torque limits; feedback may use them whole.
+    Every method has one main parameter, `MAIN_PARAMETERS`, and all are tuned alike: of its default
+    times each of `SCALES` the one that reaches from most tuning starts, then the one of the
+    smallest median time, then the first. Tuning starts are drawn by another seed than the starts.
 
     Args:
         scenario: arm, scene, goal, limits and parameters; its own start comes first.
         methods: names of `METHODS`, at least one.
         starts: number of starts; all but the first are random and touch nothing.
         seed: of the starts and of the planner; None for the scenario's own.
+        tuning_starts: number of starts to tune on; 0 keeps the defaults.
         on_progress: told what is being done.
 
     Returns:
@@ -140,33 +171,59 @@ def compare(
 
     Raises:
         UnknownNameError: a method that there is not.
-        InvalidValueError: a number of starts below one, or a seed that is not a whole number.
+        InvalidValueError: a number of starts below one, of tuning starts below zero, or a seed that
+            is not a whole number.
         DensarmError: no random start was found.
     """
     for name in methods:
         if name not in METHODS:
             raise UnknownNameError("method", name, METHODS)
-    scenario = replace(scenario, seed=scenario.seed if seed is None else seed)
-    clearance = Clearance(scenario.arm, scenario.scene)
+    scenario = _with_equal_limits(scenario, seed)
+    clearance, seed = Clearance(scenario.arm, scenario.scene), scenario.seed
     room = scenario.control.margin + scenario.control.path_margin
-    others = clear_configurations(
-        clearance, positive_integer("starts", starts) - 1, scenario.seed, room
+    others = clear_configurations(clearance, positive_integer("starts", starts) - 1, seed, room)
+    tuning = clear_configurations(
+        clearance,
+        non_negative_integer("tuning_starts", tuning_starts),
+        seed + _TUNING_SEED,
+        room,
     )
+
+    def runs(name: str, scale: float, over: Sequence[Array], what: str) -> MethodResult:
+        done = []
+        for k, start in enumerate(over):
+            on_progress(f"{name} from {what} {k + 1} of {len(over)}")
+            done.append(_run(replace(scenario, start=start), name, scale))
+        return MethodResult(name, tuple(done), scale)
+
     results = []
     for name in dict.fromkeys(methods):
-        runs = []
-        for k, start in enumerate([scenario.start, *others]):
-            on_progress(f"{name} from start {k + 1} of {starts}")
-            runs.append(_run(replace(scenario, start=start), name))
-        results.append(MethodResult(name, tuple(runs)))
-    return Comparison(scenario.name, scenario.seed, tuple(results))
+        tried = [runs(name, scale, tuning, "tuning start") for scale in SCALES if tuning]
+        scale = min(tried, key=_rank).scale if tried else 1.0
+        results.append(runs(name, scale, [scenario.start, *others], "start"))
+    return Comparison(scenario.name, seed, tuple(results), tuning_starts)
 
 
-def _run(scenario: Scenario, name: str) -> MethodRun:
+def _with_equal_limits(scenario: Scenario, seed: int | None) -> Scenario:
+    return replace(
+        scenario,
+        seed=scenario.seed if seed is None else seed,
+        timing=TimingParameters(LIMIT_SHARE, LIMIT_SHARE, LIMIT_SHARE),
+        speed=SpeedParameters(braking_share=LIMIT_SHARE, velocity_share=LIMIT_SHARE),
+    )
+
+
+def _rank(result: MethodResult) -> tuple[int, float]:
+    """Return what orders results from the best: fewest failures, then the smallest median time."""
+    time = result.median("time_s")
+    return -result.count(Outcome.REACHED), np.inf if time is None else time
+
+
+def _run(scenario: Scenario, name: str, scale: float) -> MethodRun:
     timed: list[TimedController] = []
 
     def method(scenario: Scenario, clearance: Clearance) -> Drive | NoPath:
-        drive = METHODS[name](scenario, clearance)
+        drive = METHODS[name](scenario, clearance, scale)
         if isinstance(drive, NoPath):
             return drive
         timed.append(TimedController(drive.controller))

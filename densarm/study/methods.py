@@ -2,16 +2,17 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import replace
+from typing import Protocol
 
 import numpy as np
 
 from densarm.arrays import Array
 from densarm.clearance import Clearance
-from densarm.closed_loop import Drive, Method, make_controller
+from densarm.closed_loop import Drive, make_controller
 from densarm.control.computed_torque import ComputedTorque
 from densarm.control.field_regulation import FieldRegulation
 from densarm.density import GoalDistance, TorusDistance
-from densarm.fields.barrier_filter import BarrierFilter
+from densarm.fields.barrier_filter import BarrierFilter, BarrierParameters
 from densarm.fields.barriers import Barriers
 from densarm.fields.joint_navigation_function import JointNavigationFunction
 from densarm.fields.joint_potential import PotentialAscent
@@ -24,67 +25,91 @@ from densarm.scenario import ControlForm, GuideKind, Scenario
 from densarm.swept_bound import SweptBound
 
 _NEAREST = 3  # pairs named where an arm rests
+_KAPPA = 100.0  # of the navigation function: at 10 and below it is stuck on every arm tried
 
 
-def density(scenario: Scenario, clearance: Clearance) -> Drive | NoPath:
+def density(scenario: Scenario, clearance: Clearance, scale: float = 1.0) -> Drive | NoPath:
     """Track the planning system's curve along a collision-free path by the density controller."""
-    return _by_density(scenario, clearance, ControlForm.TRACKING, GuideKind.PATH)
+    return _by_density(scenario, clearance, scale, ControlForm.TRACKING, GuideKind.PATH)
 
 
-def density_direct(scenario: Scenario, clearance: Clearance) -> Drive | NoPath:
+def density_direct(scenario: Scenario, clearance: Clearance, scale: float = 1.0) -> Drive | NoPath:
     """Follow the plain density of [ZNV] to the goal."""
-    return _by_density(scenario, clearance, ControlForm.REGULATION, GuideKind.DIRECT)
+    return _by_density(scenario, clearance, scale, ControlForm.REGULATION, GuideKind.DIRECT)
 
 
-def potential_field(scenario: Scenario, clearance: Clearance) -> Drive:
+def potential_field(scenario: Scenario, clearance: Clearance, scale: float = 1.0) -> Drive:
     """Follow Khatib's artificial potential; it repels where the density senses."""
     barriers, goal_distance, speed_law = _shared(scenario, clearance)
-    potential = JointPotentialField(
-        barriers, goal_distance, scenario.sensing.distance, scenario.sensing.joint
-    )
+    sensing = scenario.sensing
+    influence = scale * sensing.distance
+    potential = JointPotentialField(barriers, goal_distance, influence, sensing.joint)
     return _follow(scenario, PotentialAscent(potential, speed_law, scenario.gains.rate))
 
 
-def navigation_function(scenario: Scenario, clearance: Clearance) -> Drive:
+def navigation_function(scenario: Scenario, clearance: Clearance, scale: float = 1.0) -> Drive:
     """Follow Rimon and Koditschek's navigation function."""
     barriers, goal_distance, speed_law = _shared(scenario, clearance)
-    potential = JointNavigationFunction(barriers, goal_distance)
+    potential = JointNavigationFunction(barriers, goal_distance, scale * _KAPPA)
     return _follow(scenario, PotentialAscent(potential, speed_law, scenario.gains.rate))
 
 
-def cbf_qp(scenario: Scenario, clearance: Clearance) -> Drive:
+def cbf_qp(scenario: Scenario, clearance: Clearance, scale: float = 1.0) -> Drive:
     """Follow the pull of the goal, filtered by control barrier functions."""
     barriers, goal_distance, speed_law = _shared(scenario, clearance)
-    return _follow(scenario, BarrierFilter(barriers, goal_distance, speed_law, scenario.gains.rate))
+    parameters = BarrierParameters(barrier_rate=scale * BarrierParameters.barrier_rate)
+    field = BarrierFilter(barriers, goal_distance, speed_law, scenario.gains.rate, parameters)
+    return _follow(scenario, field)
 
 
-def plan_then_track(scenario: Scenario, clearance: Clearance) -> Drive | NoPath:
+def plan_then_track(scenario: Scenario, clearance: Clearance, scale: float = 1.0) -> Drive | NoPath:
     """Track the reference of `density` by computed torque."""
-    drive = density(scenario, clearance)
+    drive = density(scenario, clearance, scale)
     if isinstance(drive, NoPath) or drive.reference is None:
         return drive
     controller = ComputedTorque(scenario.arm, drive.reference, scenario.gains)
     return replace(drive, controller=controller)
 
 
-METHODS: Mapping[str, Method] = {
-    method.__name__: method
-    for method in (
-        density,
-        density_direct,
-        potential_field,
-        navigation_function,
-        cbf_qp,
-        plan_then_track,
-    )
+class ScalableMethod(Protocol):
+    """A method whose main parameter can be scaled."""
+
+    def __call__(
+        self, scenario: Scenario, clearance: Clearance, scale: float = 1.0
+    ) -> Drive | NoPath:
+        """Act as `Method`, the main parameter at `scale` times its default."""
+        ...
+
+
+METHODS: Mapping[str, ScalableMethod] = {
+    "density": density,
+    "density_direct": density_direct,
+    "potential_field": potential_field,
+    "navigation_function": navigation_function,
+    "cbf_qp": cbf_qp,
+    "plan_then_track": plan_then_track,
 }
-"""The methods by name, each called with a scenario and the clearance of its arm and scene."""
+"""The methods by name."""
+
+MAIN_PARAMETERS: Mapping[str, str] = {
+    "density": "sensing distance",
+    "density_direct": "sensing distance",
+    "potential_field": "influence distance",
+    "navigation_function": "κ",
+    "cbf_qp": "barrier rate",
+    "plan_then_track": "sensing distance",
+}
+"""What `scale` scales: the scenario's sensing distance, or the default of the rival's parameter."""
 
 
 def _by_density(
-    scenario: Scenario, clearance: Clearance, form: ControlForm, guide: GuideKind
+    scenario: Scenario, clearance: Clearance, scale: float, form: ControlForm, guide: GuideKind
 ) -> Drive | NoPath:
-    scenario = replace(scenario, control=replace(scenario.control, form=form))
+    scenario = replace(
+        scenario,
+        control=replace(scenario.control, form=form),
+        sensing=replace(scenario.sensing, distance=scale * scenario.sensing.distance),
+    )
     plan = plan_motion(scenario, clearance, guide)
     if isinstance(plan, NoPath):
         return plan

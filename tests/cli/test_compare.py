@@ -4,31 +4,36 @@ import pytest
 
 from densarm.study.methods import METHODS
 
+UNTUNED = ("--tuning-starts", 0)
+
 
 def test_table_plot_and_json(command, scenario_file, tmp_path):
     path, plot = tmp_path / "compare.json", tmp_path / "compare.png"
-    options = ["--starts", 2, "--seed", 4, "--json", path, "--plot", plot]
+    options = ["--starts", 2, "--seed", 4, "--tuning-starts", 1, "--json", path, "--plot", plot]
     done = command("compare", scenario_file(), "--methods", "potential_field,cbf_qp", *options)
     assert done.status == 0
     assert done.err == ""
     data = json.loads(path.read_text(encoding="utf-8"))
-    assert list(data) == ["methods", "starts", "scenario", "seed"]
+    assert (data["starts"], data["seed"], data["tuning_starts"]) == (2, 4, 1)
     assert [entry["method"] for entry in data["methods"]] == ["potential_field", "cbf_qp"]
     assert all(entry["reached"] >= 1 for entry in data["methods"])
     assert plot.read_bytes().startswith(b"\x89PNG")
     assert "2 starts, seed 4" in done.out
+    assert "Tuned on 1 other starts: influence distance × " in done.out
+    assert max(len(line.rstrip()) for line in done.out.splitlines()) <= 80
     for entry in data["methods"]:
         row = next(line for line in done.out.splitlines() if entry["method"] in line)
         assert row.split()[1] == str(entry["reached"])
-        assert row.split()[6] == f"{entry['time_s']:.2f}"
+        assert row.split()[5] == f"{entry['time_s']:.2f}"
         assert row.split()[-1] == f"{entry['step_us']:.0f}"
 
 
 def test_status_is_zero_whatever_was_reached(command):
-    done = command("compare", "swing_up", "--methods", "potential_field", "--starts", 1)
+    done = command("compare", "swing_up", "--methods", "potential_field", "--starts", 1, *UNTUNED)
     assert done.status == 0
     row = next(line for line in done.out.splitlines() if "potential_field" in line)
-    assert row.split()[1:6] == ["0", "0", "1", "0", "0"]
+    assert row.split()[1:5] == ["0", "0", "1", "0"]
+    assert "No parameter was tuned." in done.out
 
 
 @pytest.mark.parametrize(
@@ -38,6 +43,7 @@ def test_status_is_zero_whatever_was_reached(command):
         (["--methods", ""], ["unknown method ''"]),
         (["--starts", "0"], ["--starts"]),
         (["--seed", "-1"], ["--seed"]),
+        (["--tuning-starts", "-1"], ["--tuning-starts"]),
         (["--plot", "compare.gif"], ["--plot", ".png"]),
     ],
 )

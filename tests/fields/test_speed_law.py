@@ -90,3 +90,12 @@ def test_no_speed_without_room_and_no_bound_without_pairs(bound, law):
 def test_share_is_checked(share):
     with pytest.raises(InvalidValueError, match=r"^braking_share = "):
         SpeedParameters(braking_share=share)
+
+
+def test_velocity_share(bound):
+    far, all_the_way = np.full(bound.clearance.n_pairs, 1e9), 1e9
+    direction = np.full(NV, NV**-0.5)
+    full, half = (SpeedLaw(bound, SpeedParameters(velocity_share=share)) for share in (1.0, 0.5))
+    assert half.speed(direction, far, all_the_way) == pytest.approx(
+        0.5 * full.speed(direction, far, all_the_way)
+    )

@@ -9,8 +9,8 @@ import pytest
 from densarm.errors import InvalidValueError, UnknownNameError
 from densarm.outcome import Outcome
 from densarm.scenario import load_scenario
-from densarm.study.comparison import MEASURES, OUTCOMES, compare
-from densarm.study.methods import METHODS
+from densarm.study.comparison import LIMIT_SHARE, MEASURES, OUTCOMES, SCALES, compare
+from densarm.study.methods import MAIN_PARAMETERS, METHODS
 
 NAMES = ("density_direct", "potential_field")
 
@@ -22,16 +22,18 @@ def swing_up():
 
 @pytest.fixture(scope="module")
 def comparison(swing_up):
-    return compare(swing_up, NAMES, starts=3, seed=4)
+    return compare(swing_up, NAMES, starts=3, seed=4, tuning_starts=0)
 
 
 def test_json_holds_counts_medians_and_runs(comparison):
     data = json.loads(json.dumps(comparison.to_json(), allow_nan=False))
-    assert list(data) == ["methods", "starts", "scenario", "seed"]
+    assert list(data) == [
+        *("methods", "starts", "scenario", "seed", "tuning_starts", "limit_share"),
+    ]
     assert (data["starts"], data["scenario"], data["seed"]) == (3, "swing_up", 4)
     assert [entry["method"] for entry in data["methods"]] == list(NAMES)
     for entry in data["methods"]:
-        assert list(entry) == ["method", *OUTCOMES, *MEASURES, "runs"]
+        assert list(entry) == ["method", "parameter", "scale", *OUTCOMES, *MEASURES, "runs"]
         assert sum(entry[outcome] for outcome in OUTCOMES) == len(entry["runs"]) == 3
         reached = [run["time_s"] for run in entry["runs"] if run["outcome"] == "reached"]
         assert entry["time_s"] == pytest.approx(np.median(reached))
@@ -55,13 +57,13 @@ def test_measures_are_those_of_the_record(swing_up, comparison):
 
 
 def test_a_run_that_raises_is_recorded(swing_up, monkeypatch):
-    def raises(scenario, clearance):
+    def raises(scenario, clearance, scale):
         if (scenario.start == swing_up.start).all():
             raise InvalidValueError("gain", 0.0, "positive")
-        return METHODS["density_direct"](scenario, clearance)
+        return METHODS["density_direct"](scenario, clearance, scale)
 
     monkeypatch.setattr("densarm.study.comparison.METHODS", {"odd": raises})
-    result = compare(swing_up, ["odd"], starts=2, seed=4).methods[0]
+    result = compare(swing_up, ["odd"], starts=2, seed=4, tuning_starts=0).methods[0]
     assert result.runs[0].outcome == "failed"
     assert result.runs[0].detail == "gain = 0.0: must be positive"
     assert result.runs[1].outcome in list(Outcome)
@@ -70,7 +72,7 @@ def test_a_run_that_raises_is_recorded(swing_up, monkeypatch):
 
 def test_infeasible_for_all(swing_up):
     contact = swing_up.arm.configuration([1.2, 0.0])
-    comparison = compare(replace(swing_up, start=contact), NAMES, starts=1)
+    comparison = compare(replace(swing_up, start=contact), NAMES, starts=1, tuning_starts=0)
     for result in comparison.methods:
         assert result.count("infeasible") == 1
         assert result.median("time_s") is None
@@ -78,14 +80,49 @@ def test_infeasible_for_all(swing_up):
 
 
 def test_a_method_given_twice_runs_once(swing_up):
-    comparison = compare(swing_up, ["potential_field"] * 2, starts=1)
+    comparison = compare(swing_up, ["potential_field"] * 2, starts=1, tuning_starts=0)
     assert [result.method for result in comparison.methods] == ["potential_field"]
 
 
 def test_progress_names_method_and_start(swing_up):
     told = []
-    compare(swing_up, ["potential_field"], starts=1, on_progress=told.append)
-    assert told == ["potential_field from start 1 of 1"]
+    compare(swing_up, ["potential_field"], 1, tuning_starts=1, on_progress=told.append)
+    tuning = ["potential_field from tuning start 1 of 1"] * len(SCALES)
+    assert told == [*tuning, "potential_field from start 1 of 1"]
+
+
+@pytest.fixture
+def runs_of_odd(monkeypatch):
+    """Every (start, scale, scenario) that an odd method was run at, and which scale reaches."""
+    seen = []
+
+    def odd(scenario, clearance, scale):
+        seen.append((scenario.start.tolist(), scale, scenario))
+        if scale != SCALES[-1]:
+            raise InvalidValueError("gain", 0.0, "positive")
+        return METHODS["density_direct"](scenario, clearance)
+
+    monkeypatch.setattr("densarm.study.comparison.METHODS", {"odd": odd})
+    return seen
+
+
+def test_tuning_takes_the_scale_that_reaches_on_other_starts(swing_up, runs_of_odd):
+    result = compare(swing_up, ["odd"], starts=2, seed=4, tuning_starts=1).methods[0]
+    assert result.scale == SCALES[-1]
+    tuned, counted = runs_of_odd[: len(SCALES)], runs_of_odd[len(SCALES) :]
+    assert [scale for _, scale, _ in tuned] == list(SCALES)
+    assert [scale for _, scale, _ in counted] == [SCALES[-1]] * 2
+    assert not any(start == tuned[0][0] for start, _, _ in counted)
+
+
+def test_all_plan_with_the_same_share_of_the_limits(swing_up, runs_of_odd):
+    compare(swing_up, ["odd"], starts=1, tuning_starts=0)
+    scenario = runs_of_odd[0][2]
+    assert {*vars(scenario.timing).values(), *vars(scenario.speed).values()} == {LIMIT_SHARE}
+
+
+def test_every_method_has_a_main_parameter():
+    assert list(MAIN_PARAMETERS) == list(METHODS)
 
 
 def test_wrong_input(swing_up):
@@ -95,3 +132,5 @@ def test_wrong_input(swing_up):
         compare(swing_up, NAMES, starts=0)
     with pytest.raises(InvalidValueError, match="seed"):
         compare(swing_up, NAMES, starts=1, seed=-1)
+    with pytest.raises(InvalidValueError, match="tuning_starts = -1"):
+        compare(swing_up, NAMES, starts=1, tuning_starts=-1)

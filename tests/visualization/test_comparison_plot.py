@@ -13,7 +13,7 @@ def run(outcome, time):
 def comparison():
     density = MethodResult("density", (run("reached", 1.0), run("reached", 3.0)))
     rival = MethodResult("cbf_qp", (run("stuck", 2.0), MethodRun((0.0, 0.0), "failed", "why")))
-    return Comparison("swing_up", 0, (density, rival))
+    return Comparison("swing_up", 0, (density, rival), 0)
 
 
 def test_panels_show_counts_and_the_runs_that_reached(comparison):
