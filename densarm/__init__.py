@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from densarm.arm import Arm, JointLimits, load_arm
+    from densarm.attachment import Attachment
     from densarm.certificates.certificate import Certificate, Check
     from densarm.clearance import Clearance, ClearanceSample
     from densarm.closed_loop import make_controller, make_velocity_controller, simulate
@@ -38,7 +39,9 @@ if TYPE_CHECKING:
     from densarm.guides.direct import DirectGuide
     from densarm.guides.guide import Guide, GuidePath, NoPath
     from densarm.guides.path import PathGuide, PathGuideParameters
+    from densarm.mesh import Mesh
     from densarm.motion_plan import MotionPlan, plan_motion
+    from densarm.obstacles import Box, Capsule, Cylinder, HalfSpace, Sphere
     from densarm.outcome import Outcome
     from densarm.reference.reference import Reference
     from densarm.reference.timing_parameters import TimingParameters
@@ -51,7 +54,8 @@ if TYPE_CHECKING:
         Scenario,
         load_scenario,
     )
-    from densarm.scene import Box, Capsule, Cylinder, Scene, Sphere
+    from densarm.scene import Scene
+    from densarm.scene_files import MotionProblem, load_problems, load_scene
     from densarm.simulation.fixed_step_loop import FixedStepLoop, SimulationParameters
     from densarm.simulation.plant import Integrator, PinocchioPlant
     from densarm.simulation.single_integrator import SingleIntegrator
@@ -65,6 +69,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "Arm",
+    "Attachment",
     "Box",
     "Capsule",
     "Certificate",
@@ -93,12 +98,15 @@ __all__ = [
     "Guide",
     "GuideKind",
     "GuidePath",
+    "HalfSpace",
     "ImplicitSet",
     "Integrator",
     "InvalidValueError",
     "JointLimitSet",
     "JointLimits",
+    "Mesh",
     "MotionPlan",
+    "MotionProblem",
     "NavigationDensity",
     "NoPath",
     "Outcome",
@@ -126,7 +134,9 @@ __all__ = [
     "__version__",
     "free_body",
     "load_arm",
+    "load_problems",
     "load_scenario",
+    "load_scene",
     "make_controller",
     "make_velocity_controller",
     "plan_motion",
@@ -138,6 +148,7 @@ __all__ = [
 
 _NAMES = {
     "arm": ("Arm", "JointLimits", "load_arm"),
+    "attachment": ("Attachment",),
     "certificates.certificate": ("Certificate", "Check"),
     "clearance": ("Clearance", "ClearanceSample"),
     "control.controller": ("Controller",),
@@ -164,13 +175,16 @@ _NAMES = {
     "guides.direct": ("DirectGuide",),
     "guides.guide": ("Guide", "GuidePath", "NoPath"),
     "guides.path": ("PathGuide", "PathGuideParameters"),
+    "mesh": ("Mesh",),
     "motion_plan": ("MotionPlan", "plan_motion"),
+    "obstacles": ("Box", "Capsule", "Cylinder", "HalfSpace", "Sphere"),
     "outcome": ("Outcome",),
     "reference.reference": ("Reference",),
     "reference.timing_parameters": ("TimingParameters",),
     "robot_description": ("RobotDescription",),
     "scenario": ("ControlForm", "ControlParameters", "GuideKind", "Scenario", "load_scenario"),
-    "scene": ("Box", "Capsule", "Cylinder", "Scene", "Sphere"),
+    "scene": ("Scene",),
+    "scene_files": ("MotionProblem", "load_problems", "load_scene"),
     "closed_loop": ("make_controller", "make_velocity_controller", "simulate"),
     "simulation.fixed_step_loop": ("FixedStepLoop", "SimulationParameters"),
     "simulation.plant": ("Integrator", "PinocchioPlant"),

@@ -11,6 +11,7 @@ import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 
 from densarm.arrays import Array
+from densarm.attachment import Attachment
 from densarm.catalogue import robot_description, robot_names
 from densarm.cut_subtrees import without_subtrees
 from densarm.errors import InvalidValueError, UnknownNameError
@@ -61,6 +62,22 @@ class Arm:
     def visual_model(self) -> pin.GeometryModel:
         """Pinocchio's visual geometry, loaded when first asked for."""
         return build_visual_model(self.description)
+
+    def holding(self, *attachments: Attachment) -> "Arm":
+        """Return the same arm with bodies fixed to its links.
+
+        Their shapes join its collision and visual geometry and their inertia its model, so that
+        clearance, certificates, dynamics, pictures and recordings take them for parts of the arm.
+
+        Args:
+            attachments: the bodies, the links that hold them and their masses.
+
+        Raises:
+            UnknownNameError: a link that the arm does not have.
+            InvalidValueError: a body is named like a shape of the arm or another body.
+        """
+        held = (*self.description.attachments, *attachments)
+        return Arm(replace(self.description, attachments=held)) if attachments else self
 
     def mesh_hashes(self) -> dict[str, str]:
         """Return the SHA-256 of each collision mesh file, by its path from their common folder."""

@@ -11,7 +11,8 @@ from densarm.arrays import Array
 from densarm.compiled import compiled
 from densarm.distance_view import DistanceView
 from densarm.errors import InvalidValueError
-from densarm.scene import Scene, obstacle_pose
+from densarm.obstacles import geometry_objects
+from densarm.scene import Scene
 
 COAL_TOLERANCE = 1e-10
 """GJK and EPA tolerance [m]; at coal's default of 1e-6 gradients err by up to 4e-3."""
@@ -49,7 +50,8 @@ class Clearance:
         scene: the obstacles. Shapes that no joint moves are not paired with them.
 
     Raises:
-        InvalidValueError: an obstacle is named like a shape of the arm.
+        InvalidValueError: an obstacle is named like a shape of the arm, or the scene attaches
+            bodies that the arm does not hold.
     """
 
     def __init__(self, arm: Arm, scene: Scene) -> None:
@@ -141,13 +143,16 @@ def joint_support(model: pin.Model) -> Array:
 
 
 def _geometry_model(arm: Arm, scene: Scene) -> pin.GeometryModel:
+    for attachment in scene.attachments:
+        if attachment not in arm.description.attachments:
+            name, allowed = attachment.body.name, "held by the arm: arm.holding(*scene.attachments)"
+            raise InvalidValueError("attached body", name, allowed)
     model = arm.collision_model.copy()
     moving = [k for k, item in enumerate(model.geometryObjects) if item.parentJoint > 0]
-    for obstacle in scene:
-        if arm.collision_model.existGeometryName(obstacle.name):
+    for item in [item for obstacle in scene for item in geometry_objects(obstacle)]:
+        if model.existGeometryName(item.name):
             allowed = f"other than the names of the shapes of {arm.name!r}"
-            raise InvalidValueError("obstacle name", obstacle.name, allowed)
-        item = pin.GeometryObject(obstacle.name, 0, 0, obstacle_pose(obstacle), obstacle.geometry())
+            raise InvalidValueError("obstacle name", item.name, allowed)
         index = model.addGeometryObject(item)
         for k in moving:
             model.addCollisionPair(pin.CollisionPair(int(k), int(index)))

@@ -144,7 +144,7 @@ def _inertia(parts: Scene, mass: float) -> pin.Inertia:
     """Return the inertia of parts of one density and the given total mass."""
     total = pin.Inertia.Zero()
     for part in parts:
-        shape = part.geometry()
+        (shape,) = part.convex_shapes()
         about_centre = shape.computeMomentofInertiaRelatedToCOM()
         solid = pin.Inertia(shape.computeVolume(), shape.computeCOM(), about_centre)
         total += obstacle_pose(part).act(solid)

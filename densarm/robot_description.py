@@ -1,14 +1,19 @@
 """RobotDescription: everything that an arm is built from, as plain data."""
 
+from __future__ import annotations
+
 import importlib.metadata
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from densarm.errors import DensarmError, FileContentError, RobotDescriptionError
 from densarm.validation import one_of
+
+if TYPE_CHECKING:
+    from densarm.attachment import Attachment
 
 DATA_WHEEL = "example-robot-data"
 """Prefix ``example-robot-data:`` of a path inside that wheel's folder of robots."""
@@ -47,27 +52,35 @@ class RobotDescription:
     shapes: str = "hull"
     """What distances are measured to: "hull" or "capsule"."""
 
+    attachments: tuple[Attachment, ...] = ()
+    """Bodies that the arm holds."""
+
     def __post_init__(self) -> None:
         one_of("shapes", self.shapes, SHAPES)
 
     def to_json(self) -> dict[str, Any]:
         """Return the description as JSON data; `from_json` is its inverse."""
-        return asdict(self)
+        attachments = [item.to_json() for item in self.attachments]
+        return {**asdict(replace(self, attachments=())), "attachments": attachments}
 
     @classmethod
-    def from_json(cls, data: Mapping[str, Any]) -> "RobotDescription":
+    def from_json(cls, data: Mapping[str, Any]) -> RobotDescription:
         """Rebuild a description from the data of `to_json`.
 
         Raises:
-            DensarmError: a field is missing or unknown.
+            DensarmError: a field is missing or unknown, or an attachment is not one.
         """
+        from densarm.attachment import Attachment  # with Pinocchio, which `densarm list` spares
+
         try:
             values = dict(data)
             values["postures"] = {k: tuple(v) for k, v in values["postures"].items()}
             for key in ("package_dirs", "base_placement", "acceleration"):
                 values[key] = None if values[key] is None else tuple(values[key])
+            held = values.get("attachments", ())  # absent from what earlier versions wrote
+            values["attachments"] = tuple(Attachment.from_json(item) for item in held)
             return cls(**values)
-        except (TypeError, KeyError, AttributeError) as error:
+        except (TypeError, KeyError, AttributeError, ValueError) as error:
             raise DensarmError(f"robot description: {error}") from None
 
 

@@ -7,6 +7,11 @@ from typing import NamedTuple
 import numpy as np
 import pinocchio as pin
 
+from densarm.attached_bodies import (
+    add_attached_inertia,
+    add_attached_pairs,
+    add_attached_shapes,
+)
 from densarm.errors import RobotDescriptionError
 from densarm.locked_joints import lock_joints, locked_positions, refuse_mimics
 from densarm.robot_description import RobotDescription
@@ -39,8 +44,10 @@ def build_models(description: RobotDescription) -> RobotModels:
 
     Raises:
         RobotDescriptionError: the URDF or SRDF cannot be used, with the reason.
-        UnknownNameError: a locked joint that the URDF does not have, or a link of the SRDF.
-        InvalidValueError: a locked position or base placement that is not finite.
+        UnknownNameError: a locked joint that the URDF does not have, or a link of the SRDF or of
+            an attachment.
+        InvalidValueError: a locked position or base placement that is not finite, or an attached
+            body named like a shape of the arm.
     """
     model, collision = _parse(description, pin.GeometryType.COLLISION)
     _require_arm(model)
@@ -52,6 +59,10 @@ def build_models(description: RobotDescription) -> RobotModels:
     files = _mesh_files(collision)
     collision = differentiable_geometry(model, collision, description.shapes)
     excluded = add_self_collision_pairs(model, collision, description.srdf)
+    held = description.attachments
+    add_attached_shapes(model, collision, held)
+    add_attached_pairs(model, collision, held)
+    add_attached_inertia(model, held)
     return RobotModels(model, collision, excluded, files)
 
 
@@ -64,7 +75,9 @@ def build_visual_model(description: RobotDescription) -> pin.GeometryModel:
     Raises:
         RobotDescriptionError: a mesh is missing.
     """
-    return _parse(description, pin.GeometryType.VISUAL)[1]
+    model, visual = _parse(description, pin.GeometryType.VISUAL)
+    add_attached_shapes(model, visual, description.attachments)
+    return visual
 
 
 def joint_names(description: RobotDescription) -> list[str]:

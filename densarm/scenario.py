@@ -27,6 +27,7 @@ from densarm.guides.path import PathGuideParameters
 from densarm.reference.timing_parameters import TimingParameters
 from densarm.robot_description import RobotDescription
 from densarm.scene import Scene
+from densarm.scene_files.scene_tables import parse_scene
 from densarm.simulation.fixed_step_loop import SimulationParameters
 from densarm.tables import parse_table
 from densarm.validation import finite_vector, non_negative, non_negative_integer, one_of
@@ -176,7 +177,7 @@ TABLES: Mapping[str, type[Any]] = {
 }
 """The optional tables of a scenario file and what they hold."""
 
-_KEYS = {"title", "robot", "obstacles", "task", "seed", *TABLES}
+_KEYS = {"title", "robot", "scene", "obstacles", "task", "seed", *TABLES}
 
 
 def load_scenario(scenario: str | Path) -> Scenario:
@@ -209,14 +210,13 @@ def _parse(path: Path, data: dict[str, Any]) -> Scenario:
             raise UnknownNameError("key", key, _KEYS)
     arm = _parse_robot(path.parent, parse_table("robot", _RobotTable, data.get("robot", {})))
     task = parse_table("task", _TaskTable, data.get("task", {}))
-    obstacles = data.get("obstacles", [])
-    if not isinstance(obstacles, list):
-        raise InvalidValueError("obstacles", obstacles, "a list of tables [[obstacles]]")
+    scene = parse_scene(path.parent, data.get("scene", ""), data.get("obstacles", []))
+    arm = arm.holding(*scene.attachments)
     return Scenario(
         name=path.stem,
         title=str(data.get("title", path.stem)),
         arm=arm,
-        scene=Scene.from_json(obstacles),
+        scene=Scene(scene),
         start=_configuration(arm, "task.start", task.start),
         goal=_configuration(arm, "task.goal", task.goal),
         seed=data.get("seed", 0),

@@ -6,15 +6,17 @@ from typing import NamedTuple
 
 import coal
 import numpy as np
+import pinocchio as pin
 from numpy.typing import NDArray
 
 from densarm.arrays import Array
 from densarm.compiled import compiled
-from densarm.shapes import extreme_points
+from densarm.shapes import box_hull, convex_hull, extreme_points
 
 ACCURACY = 0.01
 """Share of the distance that a bound may fall short of it by."""
 
+_WIDEST = 1e3  # [m]
 _ITERATIONS = 40
 _CONTACT = 1e-9  # [m], closer than this no plane is looked for
 _NO_WEIGHT = 1e-12
@@ -37,7 +39,11 @@ class RoundedHulls(NamedTuple):
 
 
 def rounded_hulls(shapes: Sequence[coal.CollisionGeometry]) -> RoundedHulls:
-    """Return shapes that coal measures, spheres, capsules and convex hulls, as arrays."""
+    """Return shapes that coal measures, spheres, capsules, convex hulls and half-spaces, as arrays.
+
+    A half-space becomes a cube with a face on its surface, wider than anything reaches.
+    """
+    shapes = [_cube(shape) if isinstance(shape, coal.Halfspace) else shape for shape in shapes]
     points, radius, neighbours = [], [], []
     count = 0
     for shape in shapes:
@@ -55,6 +61,12 @@ def rounded_hulls(shapes: Sequence[coal.CollisionGeometry]) -> RoundedHulls:
         first_neighbour=np.concatenate([[0], np.cumsum([len(near) for near in neighbours])]),
         radius=np.array(radius),
     )
+
+
+def _cube(half_space: coal.Halfspace) -> coal.ConvexBase:
+    turn = pin.Quaternion.FromTwoVectors(np.array([0.0, 0.0, 1.0]), half_space.n).toRotationMatrix()
+    corners = np.array(box_hull([_WIDEST] * 3).points()) - [0.0, 0.0, 0.5 * _WIDEST]
+    return convex_hull(corners @ turn.T + half_space.d * half_space.n)
 
 
 @compiled

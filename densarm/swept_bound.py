@@ -116,6 +116,8 @@ class SweptBound:
 def _levers(model: pin.Model, shape: pin.GeometryObject) -> Array:
     """Return, for one shape, the bound r_j (nv,) of every joint that moves it, else 0."""
     levers = np.zeros(model.nv)
+    if shape.parentJoint == 0:  # fixed, and perhaps without end
+        return levers
     points, reach = extreme_points(shape.geometry)
     points = points @ shape.placement.rotation.T + shape.placement.translation
     joint = shape.parentJoint

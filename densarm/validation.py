@@ -1,5 +1,6 @@
 """Checks of values at construction, each raising one `InvalidValueError`."""
 
+import math
 from collections.abc import Collection
 from numbers import Real
 
@@ -52,16 +53,23 @@ def unit_quaternion(name: str, value: ArrayLike) -> tuple[float, ...]:
     return tuple((quaternion / norm if abs(norm - 1.0) > 1e-12 else quaternion).tolist())
 
 
+def finite_number(name: str, value: float) -> float:
+    """Return `value` if it is a finite number, else raise InvalidValueError."""
+    if not _is_finite_number(value):
+        raise InvalidValueError(name, value, "a finite number")
+    return float(value)
+
+
 def positive(name: str, value: float) -> float:
     """Return `value` if it is a finite number above zero, else raise InvalidValueError."""
-    if not _is_number(value) or not 0.0 < value < np.inf:
+    if not _is_finite_number(value) or not value > 0.0:
         raise InvalidValueError(name, value, "a finite number > 0")
     return float(value)
 
 
 def non_negative(name: str, value: float) -> float:
     """Return `value` if it is a finite number, zero or above, else raise InvalidValueError."""
-    if not _is_number(value) or not 0.0 <= value < np.inf:
+    if not _is_finite_number(value) or not value >= 0.0:
         raise InvalidValueError(name, value, "a finite number >= 0")
     return float(value)
 
@@ -87,8 +95,13 @@ def one_of(name: str, value: str, allowed: Collection[str]) -> str:
     return value
 
 
-def _is_number(value: object) -> bool:
-    return isinstance(value, Real) and not isinstance(value, bool)
+def _is_finite_number(value: object) -> bool:
+    if not isinstance(value, Real) or isinstance(value, bool):
+        return False
+    try:
+        return math.isfinite(value)
+    except OverflowError:  # an integer beyond the range of floats
+        return False
 
 
 def _array_of_numbers(value: ArrayLike) -> Array | None:

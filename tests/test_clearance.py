@@ -13,7 +13,7 @@ from densarm.clearance import Clearance
 from densarm.distance_view import DistanceView
 from densarm.errors import InvalidValueError
 from densarm.robot_description import RobotDescription
-from densarm.scene import Box, Capsule, Cylinder, Scene, Sphere
+from densarm.scene import Box, Capsule, Cylinder, HalfSpace, Scene, Sphere
 
 DATA = Path(__file__).parent / "data"
 STEP = 1e-6  # [rad or m]
@@ -29,6 +29,7 @@ OBSTACLES = {
     "box": lambda **pose: Box(name="it", size=(0.2, 0.1, 0.15), **pose),
     "capsule": lambda **pose: Capsule(name="it", radius=0.05, length=0.2, **pose),
     "cylinder": lambda **pose: Cylinder(name="it", radius=0.06, length=0.2, **pose),
+    "half-space": lambda **pose: HalfSpace(name="it", **pose),
 }
 DEPTHS = {"apart": 0.05, "touching": 1e-6, "sunk": -1e-6, "penetrating": -0.004}  # distance [m]
 
@@ -179,6 +180,19 @@ def test_capsule_and_sphere_in_closed_form(two_link, point, angle):
         along = np.clip((point - a) @ (b - a), 0.0, 1.0)  # the links are 1 m long
         expected = np.linalg.norm(point - a - along * (b - a)) - 0.05 - radius
         assert sample.distance[k] == pytest.approx(expected, abs=1e-8)
+
+
+@given(point=POINT, axis=POINT.filter(lambda n: np.linalg.norm(n) > 0.01), angle=st.floats(-3, 3))
+def test_half_space_in_closed_form(two_link, point, axis, angle):
+    normal = axis / np.linalg.norm(axis)
+    wall = HalfSpace(name="wall", normal=axis, offset=0.3, position=point)
+    absolute = np.array([angle, angle + 0.5])
+    ends = np.cumsum(np.column_stack([np.sin(absolute), 0 * absolute, -np.cos(absolute)]), axis=0)
+    heights = np.vstack([np.zeros(3), ends]) @ normal - normal @ point - 0.3
+    clearance = Clearance(two_link, Scene([wall]))
+    distance = clearance.distances(two_link.configuration([angle, 0.5]))
+    expected = np.minimum(heights[:-1], heights[1:]) - 0.05  # the links' radius
+    np.testing.assert_allclose(distance[:2], expected, rtol=0, atol=1e-9)
 
 
 @given(data=st.data())

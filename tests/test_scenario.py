@@ -44,7 +44,7 @@ def error_of(tmp_path, text):
     return message.removeprefix(f"{tmp_path / 'task.toml'}: ")
 
 
-@pytest.mark.parametrize("name", ["swing_up", "panda_table", "panda_shelf"])
+@pytest.mark.parametrize("name", ["swing_up", "panda_table", "panda_shelf", "panda_holding_bar"])
 def test_every_scenario_loads_by_name(name):
     scenario = load_scenario(name)
     assert scenario.name == name

@@ -9,7 +9,18 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from densarm.errors import DensarmError, InvalidValueError
-from densarm.scene import OBSTACLE_TYPES, Box, Capsule, Cylinder, Scene, Sphere, obstacle_pose
+from densarm.obstacles import geometry_objects
+from densarm.scene import (
+    OBSTACLE_TYPES,
+    Box,
+    Capsule,
+    Cylinder,
+    HalfSpace,
+    Mesh,
+    Scene,
+    Sphere,
+    obstacle_pose,
+)
 
 SIZE = st.floats(1e-3, 10.0)
 POSITION = st.tuples(*[st.floats(-10.0, 10.0)] * 3)
@@ -19,11 +30,16 @@ QUATERNION = (
     .map(lambda v: tuple((np.array(v) / np.linalg.norm(v)).tolist()))
 )
 POSE = {"name": st.just("it"), "position": POSITION, "orientation_xyzw": QUATERNION}
+DIRECTION = QUATERNION.map(lambda v: v[:3]).filter(lambda v: np.linalg.norm(v) > 1e-3)
+TETRAHEDRON = ((0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+PIECE = POSITION.map(lambda at: tuple(tuple(np.add(at, corner).tolist()) for corner in TETRAHEDRON))
 OBSTACLE = st.one_of(
     st.builds(Sphere, radius=SIZE, **POSE),
     st.builds(Box, size=st.tuples(SIZE, SIZE, SIZE), **POSE),
     st.builds(Capsule, radius=SIZE, length=SIZE, **POSE),
     st.builds(Cylinder, radius=SIZE, length=SIZE, **POSE),
+    st.builds(HalfSpace, normal=DIRECTION, offset=st.floats(-10.0, 10.0), **POSE),
+    st.builds(Mesh, pieces=st.lists(PIECE, min_size=1, max_size=3), **POSE),
 )
 
 
@@ -56,13 +72,26 @@ def test_pose(obstacle):
 
 
 def test_shapes():
-    assert Sphere(name="a", radius=0.3).geometry().radius == 0.3
-    corners = Box(name="a", size=(1, 2, 3)).geometry().points()
-    assert {tuple(np.abs(corner)) for corner in corners} == {(0.5, 1.0, 1.5)}
-    assert len(corners) == 8
-    capsule = Capsule(name="a", radius=0.1, length=0.4).geometry()
+    (ball,) = Sphere(name="a", radius=0.3).convex_shapes()
+    assert ball.radius == 0.3
+    (box,) = Box(name="a", size=(1, 2, 3)).convex_shapes()
+    assert {tuple(np.abs(corner)) for corner in box.points()} == {(0.5, 1.0, 1.5)}
+    assert len(box.points()) == 8
+    (capsule,) = Capsule(name="a", radius=0.1, length=0.4).convex_shapes()
     assert (capsule.radius, capsule.halfLength) == (0.1, 0.2)
-    assert isinstance(Cylinder(name="a", radius=0.1, length=0.4).geometry(), coal.ConvexBase)
+    (cylinder,) = Cylinder(name="a", radius=0.1, length=0.4).convex_shapes()
+    assert isinstance(cylinder, coal.ConvexBase)
+    (wall,) = HalfSpace(name="a", normal=(0, 2, 0), offset=0.5).convex_shapes()
+    assert (wall.n.tolist(), wall.d) == ([0.0, 1.0, 0.0], 0.5)
+    assert len(Mesh(name="a", pieces=(TETRAHEDRON, TETRAHEDRON)).convex_shapes()) == 2
+
+
+def test_shapes_of_one_body_are_numbered():
+    body = Mesh(name="mug", pieces=(TETRAHEDRON, TETRAHEDRON), position=(1, 2, 3))
+    items = geometry_objects(body)
+    assert [item.name for item in items] == ["mug.0", "mug.1"]
+    np.testing.assert_array_equal(items[1].placement.translation, (1, 2, 3))
+    assert [item.name for item in geometry_objects(Sphere(name="ball", radius=1))] == ["ball"]
 
 
 def test_obstacles_are_frozen_and_compared_by_value():
@@ -109,6 +138,21 @@ def test_wrong_boxes(fields, message):
     with pytest.raises(InvalidValueError, match=message) as raised:
         Box(**{"name": "table", "size": (1, 1, 1), **fields})
     assert "\n" not in str(raised.value)
+
+
+@pytest.mark.parametrize(
+    ("fields", "message"),
+    [
+        ({"normal": (0, 0, 0)}, r"floor.normal = \(0, 0, 0\): must be a direction, not zero"),
+        ({"normal": (0, 1)}, r"floor.normal = .*\(3,\), got \(2,\)"),
+        ({"offset": np.inf}, "floor.offset = inf: must be a finite number"),
+        ({"offset": 10**400}, "floor.offset = 1000.*: must be a finite number"),
+        ({"offset": "0"}, "floor.offset = '0': must be a finite number"),
+    ],
+)
+def test_wrong_half_spaces(fields, message):
+    with pytest.raises(InvalidValueError, match=message):
+        HalfSpace(**{"name": "floor", **fields})
 
 
 @pytest.mark.parametrize(

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from densarm.arm import load_arm
 from densarm.clearance import Clearance
-from densarm.scene import Box, Capsule, Cylinder, Scene, Sphere
+from densarm.scene import Box, Capsule, Cylinder, HalfSpace, Scene, Sphere
 from densarm.separating_planes import SeparatingPlanes
 from densarm.swept_bound import SweptBound
 
@@ -20,6 +20,7 @@ SCENE = Scene(
         Box(name="table", size=(0.4, 0.6, 0.1), position=(0.5, -0.3, 0.2)),
         Capsule(name="bar", radius=0.05, length=0.5, position=(-0.4, 0.4, 0.6)),
         Cylinder(name="post", radius=0.05, length=0.6, position=(-0.3, -0.5, 0.4)),
+        HalfSpace(name="wall", normal=(1.0, 0.2, -0.1), offset=-0.7),
     ]
 )
 ARMS = {

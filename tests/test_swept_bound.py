@@ -9,6 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from densarm.arm import Arm, load_arm
+from densarm.attachment import Attachment
 from densarm.clearance import Clearance
 from densarm.errors import InvalidValueError
 from densarm.scene import Box, Capsule, Cylinder, Scene, Sphere
@@ -25,10 +26,12 @@ SCENE = Scene(
         Cylinder(name="post", radius=0.05, length=0.6, position=(-0.3, -0.5, 0.4)),
     ]
 )
+STICK = Attachment(Box(name="stick", size=(0.5, 0.02, 0.02), position=(0, 0, 0.1)), "panda_hand")
 ARMS = {
     "two_link": lambda: load_arm("two_link"),
     "panda": lambda: load_arm("panda"),
     "panda capsules": lambda: load_arm("panda", shapes="capsule"),
+    "panda with a stick": lambda: load_arm("panda").holding(STICK),
     "branching": lambda: load_arm(BRANCHING),
     "branching, placed": lambda: load_arm(BRANCHING, base_placement=BASE),
 }

@@ -12,10 +12,13 @@ from pinocchio.visualize.meshcat_visualizer import loadMesh, loadPrimitive
 
 from densarm.arm import Arm
 from densarm.arrays import Array
-from densarm.scene import Scene, obstacle_pose
+from densarm.obstacles import geometry_objects
+from densarm.scene import Scene
 
 WORLD = 0
 """Index of the joint that carries what does not move."""
+
+_BOARD_WIDTH, _BOARD_THICKNESS = 3.0, 0.01  # [m], of what is drawn of a half-space
 
 
 class Sphere(meshcat.geometry.Sphere):
@@ -113,11 +116,30 @@ def arm_bodies(arm: Arm) -> Bodies:
 
 
 def scene_bodies(scene: Scene) -> Bodies:
-    """Return the obstacles, in the shapes that distances are measured to."""
-    return Bodies(
-        pin.GeometryObject(item.name, WORLD, WORLD, obstacle_pose(item), item.geometry())
-        for item in scene
-    )
+    """Return the obstacles but half-spaces, in the shapes that distances are measured to."""
+    return Bodies(item for item in _scene_objects(scene) if not _is_endless(item))
+
+
+def scene_boards(scene: Scene) -> Bodies:
+    """Return a thin board for each half-space, at the part of its surface nearest the origin."""
+    return Bodies(_board(item) for item in _scene_objects(scene) if _is_endless(item))
+
+
+def _scene_objects(scene: Scene) -> list[pin.GeometryObject]:
+    return [item for obstacle in scene for item in geometry_objects(obstacle)]
+
+
+def _is_endless(item: pin.GeometryObject) -> bool:
+    return isinstance(item.geometry, coal.Halfspace)
+
+
+def _board(item: pin.GeometryObject) -> pin.GeometryObject:
+    normal = item.placement.rotation @ item.geometry.n
+    surface = item.geometry.d + normal @ item.placement.translation
+    board = coal.Box(_BOARD_WIDTH, _BOARD_WIDTH, _BOARD_THICKNESS)
+    turn = pin.Quaternion.FromTwoVectors(np.array([0.0, 0.0, 1.0]), normal).toRotationMatrix()
+    pose = pin.SE3(turn, (surface - 0.5 * _BOARD_THICKNESS) * normal)
+    return pin.GeometryObject(item.name, WORLD, WORLD, pose, board)
 
 
 def _mesh(item: pin.GeometryObject) -> meshcat.geometry.Geometry:

@@ -12,10 +12,17 @@ from numpy.typing import NDArray
 from densarm.arm import Arm
 from densarm.arrays import Array
 from densarm.scene import Scene
-from densarm.visualization.bodies import WORLD, Tube, arm_bodies, scene_bodies
+from densarm.visualization.bodies import (
+    WORLD,
+    Tube,
+    arm_bodies,
+    scene_boards,
+    scene_bodies,
+)
 from densarm.visualization.camera import FIELD_OF_VIEW, Camera
 
 _OBSTACLE_COLOR = 0xCF7D56
+_BOARD_COLOR = 0xD9CFC6  # of half-spaces, which are everywhere
 _GOAL_COLOR = 0x2A9D6F
 _PATH_COLOR = 0x7B2CBF
 _FLOOR_COLOR = 0xB4BEC8
@@ -48,6 +55,9 @@ class MeshcatPlayer:
         self._bodies.draw(viewer["robot"], self._joints)
         self._obstacles.draw(
             viewer, ["obstacles"], color=_OBSTACLE_COLOR, opacity=0.75, side=0, depthWrite=False
+        )
+        scene_boards(scene).draw(
+            viewer, ["obstacles"], color=_BOARD_COLOR, opacity=0.5, side=0, depthWrite=False
         )
 
     def display(self, q: Array) -> None:

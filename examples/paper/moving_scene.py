@@ -8,6 +8,7 @@ from matplotlib.figure import Figure
 from scipy.integrate import solve_ivp
 
 from densarm.arrays import Array
+from densarm.configuration_space import EuclideanSpace
 from densarm.density.gauge import Gauge
 from densarm.density.implicit_function import UnsafeRegion, smallest_value
 from densarm.density.implicit_shapes import Ball
@@ -148,7 +149,7 @@ def main(arguments: list[str] | None = None) -> None:
     options = figure_arguments(__doc__, starts=1000, arguments=arguments)
     starts = random_starts(options.starts)
     runs = {
-        ratio: track_points(scene(ratio * U_MAX), SingleIntegrator(DT), starts, U_MAX, DURATION)
+        ratio: track_points(scene(ratio * U_MAX), SingleIntegrator(EuclideanSpace(2), DT), starts, U_MAX, DURATION)
         for ratio in SLOW + FAST
     }
     free = continuous(UNBOUNDED_SPEED, starts[: max(1, options.starts // 10)])

@@ -1,6 +1,7 @@
 import numpy as np
 import pytest
 
+from densarm.configuration_space import EuclideanSpace
 from densarm.density.gauge import Gauge
 from densarm.density.implicit_function import UnsafeRegion
 from densarm.density.implicit_shapes import Ball
@@ -10,6 +11,7 @@ from densarm.fields.moving_density import MovingDensity, MovingRegion
 from densarm.simulation.single_integrator import SingleIntegrator
 from densarm.simulation.tracking_runs import track_points
 
+PLANE = EuclideanSpace(2)
 PARAMETERS = DensityParameters(gauge=Gauge.LOG, blend_radius=0.1)
 TARGET = EllipticMotion((0.0, 0.0), (1.0, 0.6), 0.3)
 STARTS = np.array([[-3.0, 0.5], [0.0, 3.0], [2.0, -2.0]])
@@ -24,7 +26,7 @@ def swept(speed):
 def test_follows_the_target_with_an_error_of_the_order_of_the_step():
     field = MovingDensity([], TARGET, PARAMETERS, gain=2.0)
     coarse, fine = (
-        track_points(field, SingleIntegrator(dt), STARTS, 1.0, 12.0) for dt in (0.04, 0.02)
+        track_points(field, SingleIntegrator(PLANE, dt), STARTS, 1.0, 12.0) for dt in (0.04, 0.02)
     )
     assert fine.error[-1].max() < 1e-3
     np.testing.assert_allclose(coarse.error[-1], 2.0 * fine.error[-1], rtol=0.05)
@@ -34,7 +36,7 @@ def test_follows_the_target_with_an_error_of_the_order_of_the_step():
 
 def test_runs_are_what_the_plant_does_within_the_bound():
     runs = track_points(
-        MovingDensity([swept(0.5)], TARGET, PARAMETERS), SingleIntegrator(0.05), STARTS, 0.7, 3.0
+        MovingDensity([swept(0.5)], TARGET, PARAMETERS), SingleIntegrator(PLANE, 0.05), STARTS, 0.7, 3.0
     )
     np.testing.assert_array_equal(runs.x[0], STARTS)
     np.testing.assert_allclose(runs.x[1:] - runs.x[:-1], 0.05 * runs.u[:-1], atol=1e-12)
@@ -51,7 +53,7 @@ def test_a_point_in_the_way_is_entered_by_what_is_faster_alone(speed, entered):
     start = np.array([[-2.0, 0.0]])
     runs = track_points(
         MovingDensity([swept(speed)], UniformMotion((4.0, 3.0), (0.0, 0.0)), PARAMETERS),
-        SingleIntegrator(0.01),
+        SingleIntegrator(PLANE, 0.01),
         start,
         1.0,
         4.0,

@@ -9,9 +9,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from densarm.arm import Arm, load_arm
+from densarm.attachment import Attachment
 from densarm.rigid_body import free_body
 from densarm.robot_description import RobotDescription
-from densarm.scene import Scene, Sphere
+from densarm.scene import HalfSpace, Mesh, Scene, Sphere
 from densarm.visualization.meshcat_player import MeshcatPlayer
 
 NO_VISUALS = """
@@ -88,6 +89,40 @@ def test_obstacles_stand_where_the_scene_says(two_link: Arm) -> None:
     _, window = player_of(two_link, scene)
     assert "/meshcat/obstacles/ball" in window.drawn()
     np.testing.assert_allclose(window.placed()["/meshcat/obstacles/ball"][:3, 3], [1.0, 2.0, 3.0])
+
+
+def test_half_space_is_a_board_below_its_surface(two_link: Arm) -> None:
+    wall = HalfSpace(name="wall", normal=(2.0, 0.0, 0.0), offset=-0.3, position=(1.0, 5.0, 5.0))
+    _, window = player_of(two_link, Scene([wall]))
+    pose = window.placed()["/meshcat/obstacles/wall"]
+    board = window.drawn()["/meshcat/obstacles/wall"]["geometries"][0]
+    thickness = board["depth"]
+    assert board["width"] == board["height"] > 100 * thickness
+    np.testing.assert_allclose(pose[:3, 2], [1.0, 0.0, 0.0], atol=1e-12)
+    np.testing.assert_allclose(pose[:3, 3], [0.7 - 0.5 * thickness, 0.0, 0.0], atol=1e-12)
+
+
+def test_camera_does_not_step_back_for_a_half_space(two_link: Arm) -> None:
+    views = []
+    for scene in (Scene(), Scene([HalfSpace(name="floor", offset=-1.9)])):
+        player, window = player_of(two_link, scene)
+        player.place_camera(two_link.configuration([0.0, 0.0])[np.newaxis])
+        views.append([c for c in window.commands if "Cameras" in c["path"]])
+    assert views[0] == views[1]
+
+
+def test_each_piece_of_a_mesh_is_drawn(two_link: Arm) -> None:
+    piece = ((0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+    _, window = player_of(two_link, Scene([Mesh(name="mug", pieces=(piece, piece))]))
+    assert {"/meshcat/obstacles/mug.0", "/meshcat/obstacles/mug.1"} <= set(window.drawn())
+
+
+def test_held_body_moves_with_its_link(two_link: Arm) -> None:
+    ball = Sphere(name="ball", radius=0.1, position=(0.0, 0.0, -0.5))
+    player, window = player_of(two_link.holding(Attachment(ball, "lower_link")), Scene())
+    player.draw_goal(two_link.configuration([1.0, 1.0]))
+    assert {"/meshcat/robot/elbow/ball", "/meshcat/goal/elbow/ball"} <= set(window.drawn())
+    np.testing.assert_allclose(window.placed()["/meshcat/robot/elbow/ball"][:3, 3], ball.position)
 
 
 def test_display_places_the_joints(two_link: Arm) -> None:
