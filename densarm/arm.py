@@ -250,7 +250,8 @@ def load_arm(
             that they carry, e.g. a gripper.
         base_placement: pose of the base in the world; gravity and obstacles stay.
         shapes: "hull" for the convex hulls of the collision geometry, or "capsule" for the
-            smallest capsule around each of them: larger, but distances cost less.
+            smallest capsule around each of them: larger, but distances cost less. Pairs that
+            always collide are left out in either.
 
     Raises:
         UnknownNameError: no such robot, joint to move, lock or cut at, or link of the SRDF.

@@ -94,6 +94,17 @@ def test_json_keeps_what_the_file_set(tmp_path):
     assert again.simulation.integrator == "rk4"
 
 
+def test_a_part_of_a_robot_in_capsules(tmp_path):
+    robot = 'name = "panda"\njoints = ["panda_joint4", "panda_joint2"]\nshapes = "capsule"'
+    scenario = loaded(
+        tmp_path, BASE.replace('name = "two_link"', robot).replace("hanging", "ready")
+    )
+    for arm in (scenario.arm, Scenario.from_json(scenario.to_json()).arm):
+        assert arm.joint_names == ("panda_joint2", "panda_joint4")
+        shapes = arm.collision_model.geometryObjects
+        assert {type(item.geometry).__name__ for item in shapes} == {"Capsule"}
+
+
 def test_postures_by_name(tmp_path):
     scenario = loaded(tmp_path, BASE.replace("[1.0, 0.5]", '"upright"'))
     assert scenario.arm.angles(scenario.goal) == pytest.approx((np.pi, 0.0))
