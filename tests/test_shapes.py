@@ -73,6 +73,16 @@ def test_hull_encloses_its_points(points):
     assert all(tuple(corner) in corners for corner in hull.points())
 
 
+def test_hull_too_fine_for_coal_encloses_closely():
+    """A cone's tip is next to every corner of its rim, and coal takes 255 of them."""
+    angle = np.linspace(0.0, 2 * np.pi, 600, endpoint=False)
+    rim = np.column_stack([np.cos(angle), np.sin(angle), np.zeros(600)])
+    points = np.vstack([rim, [[0.0, 0.0, 0.5]]])
+    hull = convex_hull(points)
+    assert excess(hull, points) < 1e-9
+    assert np.linalg.norm(hull.points(), axis=1).max() < 1.05
+
+
 def test_mesh_becomes_its_hull(model):
     points = np.random.default_rng(0).normal(size=(60, 3))
     result = differentiable_geometry(model, geometry_of(model, (mesh_of(points), at(1, 2, 3))))
@@ -141,6 +151,7 @@ CORNERS = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0], [0.3, 0.2, 0.0]]
     [
         (CORNERS, "span no volume"),
         (CORNERS[:3] + np.eye(3), "span no volume"),
+        (np.vstack([CORNERS, [[0.5, 0.5, 1e-8]]]), "span no volume"),
         (np.zeros((8, 3)), "span no volume"),
         (np.where(CORNERS == 0.3, np.nan, CORNERS), "not finite"),
         (np.where(CORNERS == 0.3, np.inf, CORNERS), "not finite"),
