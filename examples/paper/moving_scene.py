@@ -95,14 +95,14 @@ def draw(runs: dict[float, TrackingRuns], free: dict[str, Array]) -> Figure:
     draw_plane(plane, runs[0.5])
     tracked = runs[0.5].error[:, ~runs[0.5].entered]
     errors.plot(runs[0.5].time, np.median(tracked, axis=1), color=style.BLUE,
-                label=f"u ≤ u_max, Δt = {DT} s: median")  # fmt: skip
+                label=f"$u \\leq u_{{max}}$, Δt = {DT} s: median")  # fmt: skip
     errors.plot(runs[0.5].time, tracked.max(axis=1), "--", color=style.BLUE, label="largest")
     errors.plot(free["time"], np.median(free["error"], axis=1), color=style.VERMILION,
                 label="unbounded, continuous: median")  # fmt: skip
     errors.plot(free["time"], free["error"].max(axis=1), "--", color=style.VERMILION,
                 label="largest")  # fmt: skip
     errors.set_yscale("log")
-    errors.set_ylim(1e-8, 1e4)  # room for the legend
+    errors.set_ylim(1e-8, 1e6)  # room for the legend
     errors.set_xlabel("time [s]")
     errors.set_ylabel("distance from the target [m]")
     errors.set_title("(b) tracking error", fontsize=9.5)

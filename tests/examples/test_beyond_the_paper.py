@@ -76,6 +76,7 @@ def test_distances_hold_but_for_a_region_that_does_not_enclose_its_set(run):
         ["assumptions_table", "assumptions_occupancy"],
         scenes=lambda: chosen,
         SIDE={2: 100},
+        THETAS=(0.1, 1.0),
     )
     assert result["holds"] is False
     circle, c_shape = result["numbers"]["scenes"].values()
