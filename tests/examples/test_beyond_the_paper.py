@@ -29,7 +29,7 @@ def run(tmp_path, monkeypatch):
 def test_slower_obstacles_enter_none_and_faster_ones_some(run):
     result = run(
         "moving_scene",
-        20,
+        16,
         ["moving_scene"],
         SLOW=(0.5,),
         FAST=(3.0,),
