@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from matplotlib import rc_context
@@ -129,6 +129,13 @@ def mark_goal(axes: Axes, goal: Array) -> None:
         *([value] for value in goal), "*", color=GREEN, markersize=13, markeredgecolor=BLACK,
         markeredgewidth=0.6, zorder=6, label="goal",
     )  # fmt: skip
+
+
+def legend_once(axes: Axes, location: Literal["lower left", "upper right"]) -> None:
+    """Add a legend with one entry of each name, however many artists have it."""
+    handles, names = axes.get_legend_handles_labels()
+    entries = dict(zip(names, handles, strict=True))
+    axes.legend(list(entries.values()), list(entries), loc=location, framealpha=0.95, fontsize=7)
 
 
 def outcome_colours(outcomes: Sequence[str]) -> list[str]:

@@ -10,6 +10,7 @@ from matplotlib.patches import Circle
 
 import densarm
 from densarm.arrays import Array
+from densarm.certificates.certificate import swept_result
 from densarm.control.density_tracking import DensityTracking
 from densarm.control.gains import Gains
 from densarm.density import (
@@ -37,7 +38,7 @@ from densarm.simulation import (
 )
 from densarm.simulation.proportion import Proportion
 from densarm.swept_bound import SweptBound
-from densarm.swept_check import SweptCheck, SweptVerdict
+from densarm.swept_check import SweptVerdict
 from densarm.visualization import figure_style as style
 from densarm.visualization.figure_report import FigureReport, figure_arguments
 
@@ -54,12 +55,9 @@ arm = scenario.arm
 goal = arm.postures["upright"]
 clearance = densarm.Clearance(arm, scenario.scene)
 bound = SweptBound(clearance)
-
-
-def inertia_weights() -> Array:
-    """Weights of V in proportion to the joints' inertia at the goal."""
-    inertia = arm.mass_matrix(goal).diagonal()
-    return np.asarray(inertia / inertia.min())
+nearest = SmallestClearance(clearance)
+inertia = arm.mass_matrix(goal).diagonal()
+inertia_weights = np.asarray(inertia / inertia.min())
 
 
 def sum_distance(weights: Array) -> TorusDistance:
@@ -81,20 +79,22 @@ class Basin:
         return np.asarray(np.linalg.norm(error, axis=1) <= 1.1 * CURVES.reach_radius)
 
     @property
+    def share(self) -> Proportion:
+        return Proportion(int(self.reached.sum()), len(self.starts))
+
+    @property
     def summary(self) -> dict[str, object]:
-        share = Proportion(int(self.reached.sum()), len(self.starts))
         return {
-            "starts": share.total,
-            "reached": share.count,
-            "reached_rate_95": share.interval,
+            "starts": self.share.total,
+            "reached": self.share.count,
+            "reached_rate_95": self.share.interval,
             "touched_an_obstacle": self.curves.count(Outcome.COLLIDED),
             "smallest_clearance_m": float(self.curves.smallest_h.min()),
         }
 
 
 def basin(distance: GoalDistance, unsafe: UnsafeSet, starts: Array, record: bool = False) -> Basin:
-    density = NavigationDensity([unsafe], distance)
-    field = JointSpaceField(arm, density, clearance)
+    field = JointSpaceField(arm, NavigationDensity([unsafe], distance), clearance)
     return Basin(starts, integral_curves(field, starts, CURVES, record))
 
 
@@ -106,7 +106,7 @@ def random_starts(count: int) -> Array:
     """Uniform among the joint positions that touch nothing, within half a turn of the goal."""
     error = np.random.default_rng(8).uniform(-np.pi, np.pi, (2 * count + 50, 2))
     points = arm.angles(goal) + error
-    return points[SmallestClearance(clearance)(points) > 0.0][:count]
+    return points[nearest(points) > 0.0][:count]
 
 
 def run_by_torque(unsafe: UnsafeSet, path: Array) -> Recording:
@@ -117,7 +117,7 @@ def run_by_torque(unsafe: UnsafeSet, path: Array) -> Recording:
     smooth = smooth_path(bound, configurations)
     assert smooth is not None
     reference = time_path(arm, smooth, length, simulation.control_period, TimingParameters())
-    density = NavigationDensity([unsafe], sum_distance(inertia_weights()))
+    density = NavigationDensity([unsafe], sum_distance(inertia_weights))
     controller = DensityTracking(arm, density, reference, GAINS)
     plant = PinocchioPlant(arm, simulation.dt, simulation.integrator)
     return FixedStepLoop(arm, plant, simulation).run(
@@ -125,14 +125,9 @@ def run_by_torque(unsafe: UnsafeSet, path: Array) -> Recording:
     )
 
 
-def smallest_clearance(run: Recording) -> float:
-    return min(float(clearance.distances(q).min()) for q in run.q)
-
-
 def is_proved_clear(run: Recording) -> bool:
     """Whether the swept check proves that nothing was touched between samples either."""
-    departure = np.abs(np.diff(run.v, axis=0)) * np.diff(run.time)[:, np.newaxis] / 8.0
-    return SweptCheck(bound).check(run.q, departure).verdict == SweptVerdict.CLEAR
+    return swept_result(scenario, run.q, run.v).verdict == SweptVerdict.CLEAR
 
 
 def draw_motion(ax: Axes, run: Recording) -> None:
@@ -151,24 +146,21 @@ def draw_motion(ax: Axes, run: Recording) -> None:
     for ball in scenario.scene:
         ax.add_patch(Circle((ball.position[0], ball.position[2]), ball.radius, color=style.GREY))
     style.plane_axes(ax, (-2.4, 2.4, -2.4, 2.4), "(a) the swing-up, by torque")
-    ax.set_xlabel("$x$ [m]")
-    ax.set_ylabel("$z$ [m]")
+    ax.set(xlabel="$x$ [m]", ylabel="$z$ [m]")
     ax.plot(0.0, 2.0, "*", color=style.GREEN, markersize=12, markeredgecolor=style.BLACK)
 
 
 def draw_traces(axes: list[Axes], run: Recording) -> None:
-    colours = (style.BLUE, style.VERMILION)
     rows = (
         (np.unwrap(arm.angles(run.q), axis=0), np.array([np.inf, np.inf]), "$q$ [rad]"),
         (run.v, arm.limits.velocity, "$\\dot q$ [rad/s]"),
         (run.u, arm.limits.effort, "$u$ [N·m]"),
     )
     for ax, (values, limit, label) in zip(axes, rows, strict=True):
-        for j, colour in enumerate(colours):
+        for j, colour in enumerate((style.BLUE, style.VERMILION)):
             ax.plot(run.time, values[:, j], color=colour, label=f"joint {j + 1}")
-            for side in (-limit[j], limit[j]):
-                if np.isfinite(side):
-                    ax.axhline(side, color=colour, linestyle="--", linewidth=0.7)
+            for side in (-limit[j], limit[j]) if np.isfinite(limit[j]) else ():
+                ax.axhline(side, color=colour, linestyle="--", linewidth=0.7)
         ax.set_ylabel(label)
         ax.margins(x=0.0)
         ax.grid(alpha=0.3)
@@ -181,7 +173,7 @@ def draw_traces(axes: list[Axes], run: Recording) -> None:
 @cache
 def clearance_map(extent: tuple[float, ...]) -> tuple[Array, Array, Array]:
     first, second = style.plane_grid(extent, 240)
-    return first, second, SmallestClearance(clearance)(np.stack([first, second], axis=-1))
+    return first, second, nearest(np.stack([first, second], axis=-1))
 
 
 def draw_joint_space(ax: Axes, cover: JointSpaceCover, title: str, beyond: float = 0.0) -> None:
@@ -195,15 +187,14 @@ def draw_joint_space(ax: Axes, cover: JointSpaceCover, title: str, beyond: float
         for image in (-2.0 * np.pi, 0.0, 2.0 * np.pi):
             ax.plot(x + image, y, color=style.BLACK, linewidth=0.8, linestyle="--", zorder=2)
     style.plane_axes(ax, extent, title)
-    ax.set_xlabel("$q_1$ [rad]")
-    ax.set_ylabel("$q_2$ [rad]")
+    ax.set(xlabel="$q_1$ [rad]", ylabel="$q_2$ [rad]")
     for image in (-np.pi, np.pi):
         style.mark_goal(ax, np.array([image, 0.0]))
 
 
 def draw_density(ax: Axes, cover: JointSpaceCover, path: Array) -> None:
     draw_joint_space(ax, cover, "(d) unsafe set by coal, sensing regions (dashed), ln ρ", 0.5)
-    density = NavigationDensity([cover], sum_distance(inertia_weights()))
+    density = NavigationDensity([cover], sum_distance(inertia_weights))
     field = JointSpaceField(arm, density, clearance)
     first, second = style.plane_grid((-np.pi - 0.5, np.pi + 0.5, -np.pi, np.pi), 150)
     value = field.height(np.stack([first, second], axis=-1))
@@ -211,27 +202,20 @@ def draw_density(ax: Axes, cover: JointSpaceCover, path: Array) -> None:
     ax.contour(first, second, value, levels, colors=style.SKY, linewidths=0.6, linestyles="-")
     ax.plot(*path.T, color=style.VERMILION, linewidth=1.8, zorder=5, label="planning system")
     ax.plot(*path[0], "o", color=style.VERMILION, markersize=5, zorder=6, label="start")
-    ax.legend(*_first_labels(ax), loc="lower left", framealpha=0.95, fontsize=7)
+    style.legend_once(ax, "lower left")
 
 
 def draw_basin(ax: Axes, cover: JointSpaceCover, shown: Basin, title: str) -> None:
     draw_joint_space(ax, cover, title)
-    starts = (shown.starts + np.pi) % (2.0 * np.pi) - np.pi
-    for reached, colour, name in ((True, style.BLUE, "reached"), (False, style.ORANGE, "stuck")):
-        chosen = starts[shown.reached == reached]
-        if len(chosen):
-            ax.plot(*chosen.T, ".", color=colour, markersize=3, zorder=3, label=name)
-    stuck = shown.curves.end[~shown.reached]
-    if len(stuck):
-        stuck = (stuck + np.pi) % (2.0 * np.pi) - np.pi
-        ax.plot(*stuck.T, "x", color=style.VERMILION, markersize=5, zorder=7, label="stuck here")
-    ax.legend(*_first_labels(ax), loc="upper right", framealpha=0.95, fontsize=7)
-
-
-def _first_labels(ax: Axes) -> tuple[list[object], list[str]]:
-    """One entry of each name."""
-    entries = dict(zip(*reversed(ax.get_legend_handles_labels()), strict=True))
-    return list(entries.values()), list(entries)
+    starts, ends = ((x + np.pi) % (2.0 * np.pi) - np.pi for x in (shown.starts, shown.curves.end))
+    for points, mark, size, colour, name in (
+        (starts[shown.reached], ".", 3, style.BLUE, "reached"),
+        (starts[~shown.reached], ".", 3, style.ORANGE, "stuck"),
+        (ends[~shown.reached], "x", 5, style.VERMILION, "stuck here"),
+    ):
+        if len(points):
+            ax.plot(*points.T, mark, color=colour, markersize=size, zorder=3, label=name)
+    style.legend_once(ax, "upper right")
 
 
 def draw_runs(ax: Axes, runs: list[Recording]) -> None:
@@ -254,8 +238,7 @@ def draw(
     draw_runs(axes["e"], runs)
     names = ("V: sum, inertia weights", "V: sum, equal weights", "V: the paper's product")
     for name, key, shown in zip(names, "efg", maps, strict=True):
-        share = Proportion(int(shown.reached.sum()), len(shown.starts))
-        draw_basin(axes[key], cover, shown, f"({key}) {name}:\n{share} reach")
+        draw_basin(axes[key], cover, shown, f"({key}) {name}:\n{shown.share} reach")
     return figure
 
 
@@ -263,7 +246,7 @@ def main(arguments: list[str] | None = None) -> None:
     options = figure_arguments(__doc__, starts=1000, arguments=arguments)
     cover = JointSpaceCover(bound)
     starts = random_starts(options.starts)
-    weighted, equal = sum_distance(inertia_weights()), sum_distance(np.ones(arm.nv))
+    weighted, equal = sum_distance(inertia_weights), sum_distance(np.ones(arm.nv))
     swing = basin(weighted, cover, np.array([START]), record=True)
     shown = basin(weighted, cover, starts, record=True)
     run = run_by_torque(cover, swing.curves.paths[0])
@@ -273,7 +256,7 @@ def main(arguments: list[str] | None = None) -> None:
     others = [few(equal, cover), few(ProductDistance(arm, goal), cover)]
     figure = draw(cover, swing.curves.paths[0], run, runs, [shown, *others])
     style.save_figure(figure, options.out, "fig8_swing_up")
-    clear = [smallest_clearance(each) for each in (run, *runs)]
+    clear = [float(nearest(arm.angles(each.q)).min()) for each in (run, *runs)]
     proved = [is_proved_clear(each) for each in (run, *runs)]
     held = [each.end is LoopEnd.REACHED for each in (run, *runs)]
     ratio = max(float((np.abs(each.u) / arm.limits.effort).max()) for each in (run, *runs))
@@ -288,8 +271,7 @@ def main(arguments: list[str] | None = None) -> None:
             and np.mean(shown.reached) >= 0.99
             and shown.curves.count(Outcome.COLLIDED) == 0
             and len(runs) == len(starts[:BY_TORQUE])
-            and all(held)
-            and all(proved)
+            and all([*held, *proved])
         ),
         {
             "planning_system": shown.summary,
@@ -306,7 +288,7 @@ def main(arguments: list[str] | None = None) -> None:
             "runs_by_torque_smallest_clearance_m": min(clear[1:]),
             "torque_runs_proved_clear_between_samples": sum(proved),
             "peak_torque_ratio": ratio,
-            "weights_of_V": inertia_weights().tolist(),
+            "weights_of_V": inertia_weights.tolist(),
             "traps_on_rims_inertia_weights": traps_on_rims(cover, weighted),
             "traps_on_rims_equal_weights": traps_on_rims(cover, equal),
             "sensing_semi_axes_rad": [r.ellipsoid.semi_axes.tolist() for r in cover.regions],
