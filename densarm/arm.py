@@ -46,6 +46,7 @@ class Arm:
         self.name = description.name
         self.model, self.collision_model, excluded, self._mesh_files = build_models(description)
         self.excluded_pairs: tuple[ExcludedPair, ...] = excluded
+        """Shapes that are not checked against each other though they move so, and why."""
         self.data = self.model.createData()
         self.nq: int = self.model.nq
         self.nv: int = self.model.nv

@@ -133,6 +133,15 @@ def test_locked_joints(tmp_path):
     assert loaded(tmp_path, text).arm.nv == 1
 
 
+def test_cut_joints(tmp_path):
+    text = BASE.replace("[task]", 'cut_joints = ["elbow"]\n[task]')
+    text = text.replace('"hanging"', "[0.0]").replace("[1.0, 0.5]", "[1.0]")
+    scenario = loaded(tmp_path, text)
+    assert scenario.arm.joint_names == ("shoulder",)
+    again = Scenario.from_json(scenario.to_json())
+    assert again.arm.joint_names == ("shoulder",)
+
+
 @pytest.mark.parametrize(
     ("text", "message"),
     [

@@ -17,6 +17,9 @@ from densarm.validation import positive_integer
 FAILED = "failed"
 """The outcome of a run that raised an error instead of ending."""
 
+OUTCOMES = (*map(str, Outcome), FAILED)
+"""Every way for a run to end."""
+
 PERCENTILES = (50, 95, 98)
 
 
@@ -84,6 +87,7 @@ class ProblemResults:
             "reached": self.count(Outcome.REACHED),
             "certified": self.certified,
             "total": self.total,
+            "outcomes": {outcome: self.count(outcome) for outcome in OUTCOMES},
             "plan_time_s": self.percentiles("plan_time_s"),
             "duration_s": self.percentiles("duration_s"),
             "min_clearance_m": self.min_clearance,
@@ -118,9 +122,9 @@ def _results(problems: Sequence[Problem], jobs: int) -> Iterator[ProblemResult]:
     if jobs == 1:
         yield from map(run_problem, problems)
         return
-    # Ctrl-C reaches the whole group of processes; this one alone answers it.
+    # Ctrl-C reaches the whole group of processes: it ends these at once, and only this one tells.
     pool = ProcessPoolExecutor(
-        jobs, get_context("spawn"), signal.signal, (signal.SIGINT, signal.SIG_IGN)
+        jobs, get_context("spawn"), signal.signal, (signal.SIGINT, signal.SIG_DFL)
     )
     try:
         yield from pool.map(run_problem, problems)

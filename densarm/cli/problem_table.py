@@ -2,7 +2,7 @@
 
 import click
 
-from densarm.bench.problem_results import FAILED, PERCENTILES, ProblemResults
+from densarm.bench.problem_results import OUTCOMES, PERCENTILES, ProblemResults
 from densarm.outcome import Outcome
 
 _COLUMN = 18  # characters
@@ -10,10 +10,8 @@ _COLUMN = 18  # characters
 
 def print_problems(results: ProblemResults) -> None:
     """Print how the runs ended, the percentiles of their times, and what was not reached."""
-    for outcome in (*Outcome, FAILED):
-        count = results.count(outcome)
-        if count or outcome == Outcome.REACHED:
-            _print(str(outcome), f"{count} of {results.total}")
+    for outcome in OUTCOMES:
+        _print(outcome, f"{results.count(outcome)} of {results.total}")
     _print("certified", f"{results.certified} of {results.total}")
     for label, measure in {"planning": "plan_time_s", "motion": "duration_s"}.items():
         if values := results.percentiles(measure):
