@@ -19,6 +19,12 @@ class Outcome(StrEnum):
         return _DESCRIPTIONS[self]
 
 
+FAILED = "failed"
+"""In place of an outcome: the run raised an error."""
+
+RUN_ENDS = (*map(str, Outcome), FAILED)
+"""How a run of many can end."""
+
 _DESCRIPTIONS = {
     Outcome.REACHED: "The arm reached the goal, held it and touched nothing.",
     Outcome.STUCK: "The arm came to rest away from the goal, where what drives it leads nowhere.",

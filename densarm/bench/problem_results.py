@@ -11,14 +11,8 @@ import numpy as np
 
 from densarm.bench.problem import Problem
 from densarm.closed_loop import simulate
-from densarm.outcome import Outcome
+from densarm.outcome import FAILED, RUN_ENDS, Outcome
 from densarm.validation import positive_integer
-
-FAILED = "failed"
-"""The outcome of a run that raised an error instead of ending."""
-
-OUTCOMES = (*map(str, Outcome), FAILED)
-"""Every way for a run to end."""
 
 PERCENTILES = (50, 95, 98)
 
@@ -32,7 +26,7 @@ class ProblemResult:
     index: int
     """Its place in the set."""
     outcome: str
-    """An `Outcome`, or `FAILED`."""
+    """One of `RUN_ENDS`."""
     detail: str = ""
     """What stood in the way, as a phrase."""
     duration_s: float | None = None
@@ -87,7 +81,7 @@ class ProblemResults:
             "reached": self.count(Outcome.REACHED),
             "certified": self.certified,
             "total": self.total,
-            "outcomes": {outcome: self.count(outcome) for outcome in OUTCOMES},
+            "outcomes": {outcome: self.count(outcome) for outcome in RUN_ENDS},
             "plan_time_s": self.percentiles("plan_time_s"),
             "duration_s": self.percentiles("duration_s"),
             "min_clearance_m": self.min_clearance,

@@ -7,8 +7,8 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from densarm.outcome import Outcome
-from densarm.study.comparison import OUTCOMES, Comparison, MethodResult
+from densarm.outcome import RUN_ENDS, Outcome
+from densarm.study.comparison import Comparison, MethodResult
 
 _SHOWN = {
     "reach-\ned": Outcome.REACHED,
@@ -58,7 +58,7 @@ def _tuning(comparison: Comparison) -> str:
 
 def _row(result: MethodResult) -> Sequence[str]:
     shown = [result.count(outcome) for outcome in _SHOWN.values()]
-    other = sum(result.count(outcome) for outcome in OUTCOMES) - sum(shown)
+    other = sum(result.count(outcome) for outcome in RUN_ENDS) - sum(shown)
     counts = [str(count) for count in (*shown, other)]
     measures = [
         _number(result.median(measure), scale, form) for measure, scale, form in _COLUMNS.values()

@@ -2,15 +2,15 @@
 
 import click
 
-from densarm.bench.problem_results import OUTCOMES, PERCENTILES, ProblemResults
-from densarm.outcome import Outcome
+from densarm.bench.problem_results import PERCENTILES, ProblemResults
+from densarm.outcome import RUN_ENDS, Outcome
 
 _COLUMN = 18  # characters
 
 
 def print_problems(results: ProblemResults) -> None:
     """Print how the runs ended, the percentiles of their times, and what was not reached."""
-    for outcome in OUTCOMES:
+    for outcome in RUN_ENDS:
         _print(outcome, f"{results.count(outcome)} of {results.total}")
     _print("certified", f"{results.certified} of {results.total}")
     for label, measure in {"planning": "plan_time_s", "motion": "duration_s"}.items():

@@ -13,7 +13,7 @@ from densarm.closed_loop import Drive, OnProgress, run_closed_loop
 from densarm.errors import UnknownNameError
 from densarm.fields.speed_law import SpeedParameters
 from densarm.guides.guide import NoPath
-from densarm.outcome import Outcome
+from densarm.outcome import FAILED, RUN_ENDS, Outcome
 from densarm.reference.timing_parameters import TimingParameters
 from densarm.scenario import Scenario
 from densarm.study.methods import MAIN_PARAMETERS, METHODS
@@ -29,12 +29,6 @@ SCALES = (1.0, 0.2, 5.0)
 
 _TUNING_SEED = 1_000_003  # added to the seed of the starts that are not tuned on
 
-FAILED = "failed"
-"""In place of an outcome: the run raised an error."""
-
-OUTCOMES = (*(str(outcome) for outcome in Outcome), FAILED)
-"""How a run of a comparison can end."""
-
 
 @dataclass(frozen=True)
 class MethodRun:
@@ -43,7 +37,7 @@ class MethodRun:
     start: tuple[float, ...]
     """Joint positions [rad or m]."""
     outcome: str
-    """One of `OUTCOMES`."""
+    """One of `RUN_ENDS`."""
     detail: str
     """What stood in the way, in a phrase."""
     time_s: float | None = None
@@ -109,7 +103,7 @@ class MethodResult:
             "method": self.method,
             "parameter": self.parameter,
             "scale": self.scale,
-            **{outcome: self.count(outcome) for outcome in OUTCOMES},
+            **{outcome: self.count(outcome) for outcome in RUN_ENDS},
             **{measure: self.median(measure) for measure in MEASURES},
             "runs": [run.to_json() for run in self.runs],
         }

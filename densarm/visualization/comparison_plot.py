@@ -7,8 +7,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from densarm.outcome import Outcome
-from densarm.study.comparison import OUTCOMES, Comparison
+from densarm.outcome import RUN_ENDS, Outcome
+from densarm.study.comparison import Comparison
 from densarm.visualization.figure_file import save_figure
 from densarm.visualization.figure_style import BLACK, BLUE, GREY, OUTCOME_COLOUR, new_figure
 
@@ -50,13 +50,13 @@ def comparison_figure(comparison: Comparison) -> Figure:
         axes.set_xlabel(label)
     panels[0].set_yticks(range(rows), [result.method for result in comparison.methods])
     panels[0].set_ylim(rows - 0.5, -0.5)
-    figure.legend(loc="outside lower center", ncols=len(OUTCOMES), frameon=False)
+    figure.legend(loc="outside lower center", ncols=len(RUN_ENDS), frameon=False)
     return figure
 
 
 def _plot_outcomes(axes: Axes, comparison: Comparison) -> None:
     left = np.zeros(len(comparison.methods))
-    for outcome in OUTCOMES:
+    for outcome in RUN_ENDS:
         counts = np.array([result.count(outcome) for result in comparison.methods])
         if not counts.any():
             continue

@@ -149,7 +149,9 @@ def main(arguments: list[str] | None = None) -> None:
     options = figure_arguments(__doc__, starts=1000, arguments=arguments)
     starts = random_starts(options.starts)
     runs = {
-        ratio: track_points(scene(ratio * U_MAX), SingleIntegrator(EuclideanSpace(2), DT), starts, U_MAX, DURATION)
+        ratio: track_points(
+            scene(ratio * U_MAX), SingleIntegrator(EuclideanSpace(2), DT), starts, U_MAX, DURATION
+        )
         for ratio in SLOW + FAST
     }
     free = continuous(UNBOUNDED_SPEED, starts[: max(1, options.starts // 10)])

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from densarm.bench.problem import Problem, random_problems
-from densarm.bench.problem_results import FAILED, OUTCOMES, run_problems
+from densarm.bench.problem_results import run_problems
 from densarm.errors import InvalidValueError
+from densarm.outcome import FAILED, RUN_ENDS
 from densarm.scene import Scene, Sphere
 
 
@@ -37,7 +38,7 @@ def test_figures_of_runs():
     assert (results.count("reached"), results.certified, results.total) == (2, 2, 2)
     data = json.loads(json.dumps(results.to_json(), allow_nan=False))
     assert (data["reached"], data["certified"], data["total"]) == (2, 2, 2)
-    assert data["outcomes"] == {**dict.fromkeys(OUTCOMES, 0), "reached": 2}
+    assert data["outcomes"] == {**dict.fromkeys(RUN_ENDS, 0), "reached": 2}
     assert {"scene", "index", "outcome", "certified"} <= set(data["problems"][0])
     assert data["duration_s"] == sorted(data["duration_s"])
 

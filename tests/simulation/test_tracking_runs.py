@@ -36,7 +36,11 @@ def test_follows_the_target_with_an_error_of_the_order_of_the_step():
 
 def test_runs_are_what_the_plant_does_within_the_bound():
     runs = track_points(
-        MovingDensity([swept(0.5)], TARGET, PARAMETERS), SingleIntegrator(PLANE, 0.05), STARTS, 0.7, 3.0
+        MovingDensity([swept(0.5)], TARGET, PARAMETERS),
+        SingleIntegrator(PLANE, 0.05),
+        STARTS,
+        0.7,
+        3.0,
     )
     np.testing.assert_array_equal(runs.x[0], STARTS)
     np.testing.assert_allclose(runs.x[1:] - runs.x[:-1], 0.05 * runs.u[:-1], atol=1e-12)

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from densarm.errors import InvalidValueError, UnknownNameError
-from densarm.outcome import Outcome
+from densarm.outcome import RUN_ENDS, Outcome
 from densarm.scenario import load_scenario
-from densarm.study.comparison import LIMIT_SHARE, MEASURES, OUTCOMES, SCALES, compare
+from densarm.study.comparison import LIMIT_SHARE, MEASURES, SCALES, compare
 from densarm.study.methods import MAIN_PARAMETERS, METHODS
 
 NAMES = ("density_direct", "potential_field")
@@ -33,8 +33,8 @@ def test_json_holds_counts_medians_and_runs(comparison):
     assert (data["starts"], data["scenario"], data["seed"]) == (3, "swing_up", 4)
     assert [entry["method"] for entry in data["methods"]] == list(NAMES)
     for entry in data["methods"]:
-        assert list(entry) == ["method", "parameter", "scale", *OUTCOMES, *MEASURES, "runs"]
-        assert sum(entry[outcome] for outcome in OUTCOMES) == len(entry["runs"]) == 3
+        assert list(entry) == ["method", "parameter", "scale", *RUN_ENDS, *MEASURES, "runs"]
+        assert sum(entry[outcome] for outcome in RUN_ENDS) == len(entry["runs"]) == 3
         reached = [run["time_s"] for run in entry["runs"] if run["outcome"] == "reached"]
         assert entry["time_s"] == pytest.approx(np.median(reached))
         assert all(run["step_us"] > 0.0 for run in entry["runs"])
