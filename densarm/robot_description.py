@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from densarm.errors import DensarmError, FileContentError, RobotDescriptionError
-from densarm.validation import one_of
 
 if TYPE_CHECKING:
     from densarm.attachment import Attachment
@@ -56,6 +55,8 @@ class RobotDescription:
     """Bodies that the arm holds."""
 
     def __post_init__(self) -> None:
+        from densarm.validation import one_of  # it imports NumPy, which listing does without
+
         one_of("shapes", self.shapes, SHAPES)
 
     def to_json(self) -> dict[str, Any]:
