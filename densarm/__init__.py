@@ -62,6 +62,7 @@ if TYPE_CHECKING:
     from densarm.swept_bound import SweptBound
     from densarm.swept_check import SweptCheck
     from densarm.trajectory import Trajectory
+    from densarm.visualization.picture_file import save_animation, save_picture
     from densarm.visualization.plots import save_plot
     from densarm.visualization.view import save_html, view
 
@@ -140,7 +141,9 @@ __all__ = [
     "make_controller",
     "make_velocity_controller",
     "plan_motion",
+    "save_animation",
     "save_html",
+    "save_picture",
     "save_plot",
     "simulate",
     "view",
@@ -192,6 +195,7 @@ _NAMES = {
     "swept_bound": ("SweptBound",),
     "swept_check": ("SweptCheck",),
     "trajectory": ("Trajectory",),
+    "visualization.picture_file": ("save_animation", "save_picture"),
     "visualization.plots": ("save_plot",),
     "visualization.view": ("save_html", "view"),
 }

@@ -18,7 +18,7 @@ from densarm.errors import InvalidValueError, UnknownNameError
 from densarm.joint_limits import JointLimits, joint_limits
 from densarm.joint_selection import only_joints, without_joints
 from densarm.robot_description import RobotDescription, read_text
-from densarm.robot_models import build_models, build_visual_model
+from densarm.robot_models import build_models, build_visual_model, end_effector_frame
 from densarm.self_collision import ExcludedPair, srdf_postures
 from densarm.validation import finite_vector
 
@@ -55,7 +55,7 @@ class Arm:
         self.idx_q: NDArray[np.int64] = np.array([joint.idx_q for joint in joints])
         self.is_circle: NDArray[np.bool_] = np.array([joint.nq == 2 for joint in joints])
         self.limits: JointLimits = joint_limits(self.model, description.acceleration)
-        self.end_effector_frame: int = self._end_effector_frame()
+        self.end_effector_frame = end_effector_frame(self.model, description.end_effector)
         self.end_effector: str = self.model.frames[self.end_effector_frame].name
         self.postures: dict[str, Array] = self._postures()
 
@@ -189,18 +189,6 @@ class Arm:
         q = self.check_configuration("configuration", q)
         v = finite_vector("velocity", v, self.nv)
         return np.array(pin.nonLinearEffects(self.model, self.data, q, v))
-
-    def _end_effector_frame(self) -> int:
-        """Return the index of the end effector's frame: the link, where a joint shares its name."""
-        frames = list(self.model.frames)
-        name = self.description.end_effector
-        if name is None:
-            last = self.model.njoints - 1
-            return max(k for k, frame in enumerate(frames) if frame.parentJoint == last)
-        named = [k for k, frame in enumerate(frames) if frame.name == name]
-        if not named:
-            raise UnknownNameError("end-effector frame", name, [frame.name for frame in frames])
-        return max(named, key=lambda k: bool(frames[k].type == pin.FrameType.BODY))
 
     def _postures(self) -> dict[str, Array]:
         postures: dict[str, Array] = {}

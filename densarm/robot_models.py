@@ -12,7 +12,7 @@ from densarm.attached_bodies import (
     add_attached_pairs,
     add_attached_shapes,
 )
-from densarm.errors import RobotDescriptionError
+from densarm.errors import RobotDescriptionError, UnknownNameError
 from densarm.locked_joints import lock_joints, locked_positions, refuse_mimics
 from densarm.robot_description import RobotDescription
 from densarm.self_collision import ExcludedPair, add_self_collision_pairs
@@ -78,6 +78,26 @@ def build_visual_model(description: RobotDescription) -> pin.GeometryModel:
     model, visual = _parse(description, pin.GeometryType.VISUAL)
     add_attached_shapes(model, visual, description.attachments)
     return visual
+
+
+def end_effector_frame(model: pin.Model, name: str | None) -> int:
+    """Return the index of a frame: the link, where a joint shares its name.
+
+    Args:
+        model: the arm.
+        name: of the frame; None for the last that the last joint carries.
+
+    Raises:
+        UnknownNameError: the model has no such frame.
+    """
+    frames = list(model.frames)
+    if name is None:
+        last = model.njoints - 1
+        return max(k for k, frame in enumerate(frames) if frame.parentJoint == last)
+    named = [k for k, frame in enumerate(frames) if frame.name == name]
+    if not named:
+        raise UnknownNameError("end-effector frame", name, [frame.name for frame in frames])
+    return max(named, key=lambda k: bool(frames[k].type == pin.FrameType.BODY))
 
 
 def joint_names(description: RobotDescription) -> list[str]:

@@ -1,6 +1,5 @@
 """``densarm run``: plan and simulate a scenario."""
 
-import logging
 from pathlib import Path
 
 import click
@@ -8,6 +7,7 @@ import click
 from densarm.cli.exit_status import ExitStatus
 from densarm.cli.json_file import write_json
 from densarm.cli.output_option import output_option
+from densarm.cli.picture_options import picture_options, write_pictures
 from densarm.cli.progress import progress
 
 
@@ -25,13 +25,7 @@ from densarm.cli.progress import progress
     help="Seed of the planner.  [default: what the scenario says, else 0]",
 )
 @output_option("--save", "RUN.npz", "Write the recorded run.")
-@output_option("--html", "RUN.html", "Write a page that plays the run.")
-@output_option(
-    "--plot",
-    "RUN.png",
-    "Plot positions, velocities, torques and clearance over time.",
-    endings=(".png", ".pdf", ".svg"),
-)
+@picture_options
 @output_option("--json", "FILE", "Write the summary as JSON.")
 def run(
     scenario: str,
@@ -40,6 +34,8 @@ def run(
     save: Path | None,
     html: Path | None,
     plot: Path | None,
+    png: Path | None,
+    gif: Path | None,
     json: Path | None,
 ) -> int:
     """Plan and simulate SCENARIO: a name of `densarm list`, or a TOML file.
@@ -50,6 +46,7 @@ def run(
     \b
     Examples:
       densarm run swing_up --html swing_up.html
+      densarm run panda_shelf --png panda_shelf.png --gif panda_shelf.gif
       densarm run my_scenario.toml --guide direct --save run.npz --json run.json
     """  # noqa: D301
     with progress() as report:
@@ -65,15 +62,7 @@ def run(
         report("writing")
         if save:
             trajectory.save(save)
-        if html:
-            from densarm.visualization.view import save_html
-
-            save_html(trajectory, html)
-        if plot:
-            logging.getLogger("matplotlib").setLevel(logging.ERROR)  # it tells of its font cache
-            from densarm.visualization.plots import save_plot
-
-            save_plot(trajectory, plot)
+        write_pictures(trajectory, html, plot, png, gif)
         if json:
             write_json(json, trajectory.summary())
     print_run(trajectory, certificate)

@@ -1,22 +1,35 @@
-"""``densarm view``: play a recorded run in the browser."""
+"""``densarm view``: show a recorded run."""
+
+from pathlib import Path
 
 import click
 
 from densarm.cli.exit_status import ExitStatus
+from densarm.cli.picture_options import picture_options, write_pictures
 
 
 @click.command()
 @click.argument("run", metavar="RUN.npz")
-def view(run: str) -> int:
-    """Play a recorded run in the browser, in real time, until Ctrl-C.
+@picture_options
+def view(run: str, html: Path | None, plot: Path | None, png: Path | None, gif: Path | None) -> int:
+    """Show a recorded run: in the browser until Ctrl-C, or as files.
+
+    Without options a page opens that plays the run in real time, with play, pause and a time line.
+    With options it writes the files that they name and ends.
 
     \b
-    Example:
+    Examples:
       densarm run swing_up --save swing_up.npz
       densarm view swing_up.npz
+      densarm view swing_up.npz --gif swing_up.gif
     """  # noqa: D301
     from densarm.trajectory import Trajectory
-    from densarm.visualization.view import view as play
 
-    play(Trajectory.load(run), on_url=lambda url: click.echo(f"{url}  (Ctrl-C ends)"))
+    trajectory = Trajectory.load(run)
+    if html or plot or png or gif:
+        write_pictures(trajectory, html, plot, png, gif)
+        return ExitStatus.SUCCESS
+    from densarm.visualization.view import view as show
+
+    show(trajectory, on_url=lambda url: click.echo(f"{url}  (Ctrl-C ends)"))
     return ExitStatus.SUCCESS

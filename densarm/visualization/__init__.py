@@ -1,1 +1,1 @@
-"""Playback of runs by meshcat: live in the browser, or as one HTML file."""
+"""What there is to see of runs: a page for the browser, pictures and plots."""

@@ -1,19 +1,21 @@
-"""Bodies: geometry that moves with joints, as meshcat draws it."""
+"""Bodies: named surfaces that move with the joints of an arm."""
 
-from collections.abc import Iterable
-from typing import Any
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import product
 
 import coal
-import meshcat
-import meshcat.geometry
 import numpy as np
 import pinocchio as pin
-from pinocchio.visualize.meshcat_visualizer import loadMesh, loadPrimitive
 
 from densarm.arm import Arm
 from densarm.arrays import Array
 from densarm.obstacles import geometry_objects
 from densarm.scene import Scene
+from densarm.shapes import box_hull, extreme_points
+from densarm.visualization.palette import BOARD, OBSTACLE, SENSING, Color
+from densarm.visualization.triangle_mesh import TriangleMesh, mesh_of, rounded_hull
 
 WORLD = 0
 """Index of the joint that carries what does not move."""
@@ -21,142 +23,98 @@ WORLD = 0
 _BOARD_WIDTH, _BOARD_THICKNESS = 3.0, 0.01  # [m], of what is drawn of a half-space
 
 
-class Sphere(meshcat.geometry.Sphere):
-    """Meshcat's sphere with a round outline."""
+@dataclass(frozen=True)
+class Body:
+    """A surface in the frame of a joint."""
 
-    def lower(self, object_data: dict[str, Any]) -> dict[str, Any]:
-        """Return the sphere as three.js reads it."""
-        return {**super().lower(object_data), "widthSegments": 48, "heightSegments": 32}
+    name: str
+    joint: int
+    """Index of the joint that carries it."""
+    placement: pin.SE3
+    """Pose of the mesh in the joint's frame."""
+    mesh: TriangleMesh
+    color: Color
+    shape: coal.CollisionGeometry
+    """What the mesh is the surface of."""
 
+    @property
+    def has_end(self) -> bool:
+        """Whether it is all there is of the shape, which a half-space's board is not."""
+        return not isinstance(self.shape, coal.Halfspace)
 
-class Tube(meshcat.geometry.Geometry):
-    """A tube along a curve, since browsers draw every line one pixel wide.
-
-    Args:
-        points: (N, 3) on the curve [m], N ≥ 2, all different from their neighbours.
-        radius: of the tube [m].
-    """
-
-    def __init__(self, points: Array, radius: float) -> None:
-        super().__init__()
-        self.points = points
-        self.radius = radius
-
-    def lower(self, object_data: dict[str, Any]) -> dict[str, Any]:  # noqa: ARG002
-        """Return the tube as three.js reads it."""
-        curve = {
-            "type": "CatmullRomCurve3",
-            "arcLengthDivisions": 4 * len(self.points),
-            "points": self.points.tolist(),
-            "closed": False,
-            "curveType": "centripetal",
-        }
-        return {
-            "uuid": self.uuid,
-            "type": "TubeGeometry",
-            "path": curve,
-            "tubularSegments": 2 * len(self.points),
-            "radius": self.radius,
-            "radialSegments": 10,
-            "closed": False,
-        }
-
-
-class Bodies:
-    """Geometry objects with their meshes, which several drawings of them share.
-
-    Args:
-        objects: Pinocchio's geometry objects, placed in the frames of their parent joints.
-    """
-
-    def __init__(self, objects: Iterable[pin.GeometryObject]) -> None:
-        self.objects = tuple(objects)
-        self._meshes = [_mesh(item) for item in self.objects]
-
-    def draw(self, viewer: meshcat.Visualizer, names: list[str], **material: Any) -> None:
-        """Draw each object below the node of its joint.
-
-        Args:
-            viewer: the node that the joints' nodes belong under.
-            names: node name of each joint.
-            material: properties of three.js' Phong material; `color` defaults to the object's own.
-        """
-        for item, mesh in zip(self.objects, self._meshes, strict=True):
-            look = {
-                "color": _hexadecimal(item.meshColor),
-                "opacity": float(item.meshColor[3]),
-                "flatShading": isinstance(item.geometry, coal.ConvexBase),
-                **material,
-            }
-            node = viewer[names[item.parentJoint]][item.name]
-            node.set_object(mesh, meshcat.geometry.MeshPhongMaterial(**look))
-            node.set_transform(item.placement.homogeneous)
-
-    def corners(self, joint_poses: list[pin.SE3]) -> Array:
-        """Return the corners (8 K, 3) of the objects' bounding boxes in the world frame [m].
+    def corners(self, joint_poses: Sequence[pin.SE3]) -> Array:
+        """Return the corners (8, 3) of the bounding box in the world frame [m].
 
         Args:
             joint_poses: pose of each joint in the world.
         """
-        return np.vstack(
-            [
-                _box_corners(item.geometry) @ pose.rotation.T + pose.translation
-                for item in self.objects
-                for pose in [joint_poses[item.parentJoint] * item.placement]
-            ]
-        )
+        pose = joint_poses[self.joint] * self.placement
+        return np.asarray(self._local_corners @ pose.rotation.T + pose.translation)
+
+    @cached_property
+    def _local_corners(self) -> Array:
+        low, high = self.mesh.vertices.min(axis=0), self.mesh.vertices.max(axis=0)
+        signs = np.array(list(product((0, 1), repeat=3)))
+        return np.asarray(low + signs * (high - low))
 
 
-def arm_bodies(arm: Arm) -> Bodies:
+def arm_bodies(arm: Arm) -> tuple[Body, ...]:
     """Return the visual geometry of an arm, and the collision geometry of links without one."""
     visual = list(arm.visual_model.geometryObjects)
     seen = {item.parentFrame for item in visual}
     plain = [item for item in arm.collision_model.geometryObjects if item.parentFrame not in seen]
-    return Bodies(visual + plain)
+    return tuple(
+        _body(item, (float(red), float(green), float(blue)))
+        for item in visual + plain
+        for red, green, blue, _ in [item.meshColor]
+    )
 
 
-def scene_bodies(scene: Scene) -> Bodies:
-    """Return the obstacles but half-spaces, in the shapes that distances are measured to."""
-    return Bodies(item for item in _scene_objects(scene) if not _is_endless(item))
+def obstacle_bodies(scene: Scene) -> tuple[Body, ...]:
+    """Return the obstacles, in the shapes that distances are measured to.
+
+    A half-space is a thin board at the part of its surface nearest the origin.
+    """
+    return tuple(
+        _board(item) if isinstance(item.geometry, coal.Halfspace) else _body(item, OBSTACLE)
+        for item in _obstacles(scene)
+    )
 
 
-def scene_boards(scene: Scene) -> Bodies:
-    """Return a thin board for each half-space, at the part of its surface nearest the origin."""
-    return Bodies(_board(item) for item in _scene_objects(scene) if _is_endless(item))
+def sensing_bodies(scene: Scene, distance: float) -> tuple[Body, ...]:
+    """Return all that is within a distance of each obstacle that has an end.
+
+    Args:
+        scene: the obstacles.
+        distance: from their surfaces [m].
+    """
+    bodies = []
+    for item in _obstacles(scene):
+        if isinstance(item.geometry, coal.Halfspace):
+            continue
+        points, radius = extreme_points(item.geometry)
+        mesh = rounded_hull(points, radius + distance)
+        bodies.append(
+            Body(item.name, item.parentJoint, item.placement, mesh, SENSING, item.geometry)
+        )
+    return tuple(bodies)
 
 
-def _scene_objects(scene: Scene) -> list[pin.GeometryObject]:
-    return [item for obstacle in scene for item in geometry_objects(obstacle)]
+def _obstacles(scene: Scene) -> Iterable[pin.GeometryObject]:
+    for obstacle in scene:
+        yield from geometry_objects(obstacle)
 
 
-def _is_endless(item: pin.GeometryObject) -> bool:
-    return isinstance(item.geometry, coal.Halfspace)
-
-
-def _board(item: pin.GeometryObject) -> pin.GeometryObject:
+def _board(item: pin.GeometryObject) -> Body:
     normal = item.placement.rotation @ item.geometry.n
     surface = item.geometry.d + normal @ item.placement.translation
-    board = coal.Box(_BOARD_WIDTH, _BOARD_WIDTH, _BOARD_THICKNESS)
+    board = box_hull([_BOARD_WIDTH, _BOARD_WIDTH, _BOARD_THICKNESS])
     turn = pin.Quaternion.FromTwoVectors(np.array([0.0, 0.0, 1.0]), normal).toRotationMatrix()
     pose = pin.SE3(turn, (surface - 0.5 * _BOARD_THICKNESS) * normal)
-    return pin.GeometryObject(item.name, WORLD, WORLD, pose, board)
+    return Body(item.name, WORLD, pose, mesh_of(board), BOARD, item.geometry)
 
 
-def _mesh(item: pin.GeometryObject) -> meshcat.geometry.Geometry:
-    if isinstance(item.geometry, coal.Sphere):
-        return Sphere(item.geometry.radius)
-    if isinstance(item.geometry, coal.ShapeBase):
-        return loadPrimitive(item)
-    return loadMesh(item.geometry)
-
-
-def _hexadecimal(rgba: Array) -> int:
-    red, green, blue = (round(255 * float(part)) for part in rgba[:3])
-    return red << 16 | green << 8 | blue
-
-
-def _box_corners(geometry: coal.CollisionGeometry) -> Array:
-    geometry.computeLocalAABB()
-    low, high = geometry.aabb_local.min_, geometry.aabb_local.max_
-    signs = np.array(np.meshgrid([0, 1], [0, 1], [0, 1])).reshape(3, 8).T
-    return np.asarray(low + signs * (high - low))
+def _body(item: pin.GeometryObject, color: Color) -> Body:
+    return Body(
+        item.name, item.parentJoint, item.placement, mesh_of(item.geometry), color, item.geometry
+    )

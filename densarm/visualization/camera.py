@@ -1,17 +1,24 @@
 """Camera: where to look from so that given points fill the picture."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import product
 
+import coal
 import numpy as np
+import pinocchio as pin
 
 from densarm.arrays import Array
+from densarm.visualization.bodies import Body
 
 FIELD_OF_VIEW = 35.0
 """Vertical opening angle of the camera [deg]."""
 
 _ASPECT = 1.3  # width over height of the narrowest window that still shows everything
-_FILL = 0.8  # part of the picture that the points may take
-_SIDE = np.array([1.0, -1.0, 0.7])  # octant of the camera: in front, to the right, above
+_FILL = 0.76  # part of the picture that the points may take; words stand above and below
+_SLANTS = ((1.0, 1.0, 0.7), (0.4, 1.0, 0.6), (1.0, 0.4, 0.6))  # in front, aside, above
+_SIDES = tuple(product((1.0, -1.0), (-1.0, 1.0)))  # signs of x and y, the usual ones first
+_SIGHT = 2e-3  # thickness of a line of sight [m]
 
 
 @dataclass(frozen=True)
@@ -26,24 +33,63 @@ class Camera:
     offset: Array
 
     @classmethod
-    def facing(cls, points: Array) -> "Camera":
-        """Return the nearest camera that sees all points.
+    def facing(
+        cls, points: Array, watched: Array | None = None, obstacles: Sequence[Body] = ()
+    ) -> "Camera":
+        """Return a camera that sees all points and, of what is watched, as much as it can.
 
         It looks along the directions in which the points extend least: straight at the plane of a
-        planar arm, and from a corner at an arm that moves in space.
+        planar arm, and from a corner at an arm that moves in space, the corner from where
+        obstacles hide least.
 
         Args:
             points: (N, 3) in the world frame [m], N ≥ 1.
+            watched: points (W, 3) that obstacles should not hide [m]; None for none.
+            obstacles: bodies at rest in the world.
         """
+        cameras = [cls._along(points, slant, side) for side in _SIDES for slant in _SLANTS]
+        if watched is None or not obstacles:
+            return cameras[0]
+        return max(cameras, key=lambda camera: camera._seen(watched, obstacles))
+
+    @property
+    def axes(self) -> Array:
+        """Unit vectors (3, 3) in rows: to the right, upwards and towards the camera."""
+        back = self.offset / np.linalg.norm(self.offset)
+        right = np.cross([0.0, 0.0, 1.0], back)
+        right /= np.linalg.norm(right)
+        return np.array([right, np.cross(back, right), back])
+
+    @classmethod
+    def _along(cls, points: Array, slant: tuple[float, ...], side: tuple[float, ...]) -> "Camera":
         low, high = points.min(axis=0), points.max(axis=0)
         target = (low + high) / 2.0
-        direction = _SIDE / np.maximum(high - low, 0.05 * np.max(high - low) + 1e-6)
-        direction /= np.linalg.norm(direction)
-        right = np.cross([0.0, 0.0, 1.0], direction)
-        right /= np.linalg.norm(right)
-        up = np.cross(direction, right)
-        slope = _FILL * np.tan(np.radians(FIELD_OF_VIEW) / 2.0)
-        offset = points - target
-        width = np.maximum(np.abs(offset @ up) / slope, np.abs(offset @ right) / (slope * _ASPECT))
-        distance = float(np.max(offset @ direction + width))
-        return cls(target, distance * direction)
+        extent = np.maximum(high - low, 0.05 * np.max(high - low) + 1e-6)
+        direction = np.array([*side, 1.0]) * slant / extent
+        camera = cls(target, direction / np.linalg.norm(direction))
+        # A camera at depth D and m aside sees the point at (x, depth) if |x - m| <= w (D - depth).
+        seen = (points - target) @ camera.axes.T
+        width = np.array([_ASPECT, 1.0]) * _FILL * np.tan(np.radians(FIELD_OF_VIEW) / 2.0)
+        from_right = (seen[:, 2:] + seen[:, :2] / width).max(axis=0)
+        from_left = (seen[:, 2:] - seen[:, :2] / width).max(axis=0)
+        aside = width * (from_right - from_left) / 2.0
+        distance = float((from_right + from_left).max() / 2.0)
+        return cls(target + aside @ camera.axes[:2], distance * camera.offset)
+
+    def _seen(self, watched: Array, obstacles: Sequence[Body]) -> int:
+        """Return how many points (W, 3) no obstacle hides."""
+        return sum(not self._is_hidden(point, obstacles) for point in watched)
+
+    def _is_hidden(self, point: Array, obstacles: Sequence[Body]) -> bool:
+        sight = self.target + self.offset - point
+        length = float(np.linalg.norm(sight))
+        rotation = pin.Quaternion.FromTwoVectors(np.array([0.0, 0.0, 1.0]), sight).matrix()
+        line = coal.Capsule(_SIGHT / 2.0, length)
+        pose = coal.Transform3s(rotation, point + sight / 2.0)
+        request, result = coal.CollisionRequest(), coal.CollisionResult()
+        for body in obstacles:
+            place = coal.Transform3s(body.placement.rotation, body.placement.translation)
+            result.clear()
+            if coal.collide(line, pose, body.shape, place, request, result):
+                return True
+        return False

@@ -68,8 +68,10 @@ def test_ctrl_c_while_saving(command, scenario_file, tmp_path, monkeypatch):
 @pytest.mark.parametrize(
     ("option", "name", "writer"),
     [
-        ("--html", "run.html", "densarm.visualization.meshcat_player.MeshcatPlayer.animation"),
+        ("--html", "run.html", "densarm.visualization.html_page.draw"),
         ("--plot", "run.png", "matplotlib.figure.Figure.savefig"),
+        ("--png", "run.png", "densarm.visualization.picture.Picture.frame"),
+        ("--gif", "run.gif", "densarm.visualization.picture.Picture.frame"),
         ("--json", "run.json", "densarm.trajectory.Trajectory.summary"),
     ],
 )
@@ -81,5 +83,6 @@ def test_ctrl_c_while_writing(command, scenario_file, tmp_path, monkeypatch, opt
 
 
 def test_ctrl_c_ends_the_view(command, swing_up, monkeypatch):
-    monkeypatch.setattr("densarm.visualization.view.play", interrupt)
+    monkeypatch.setattr("webbrowser.open", bool)
+    monkeypatch.setattr("densarm.visualization.page_server.PageServer.serve_forever", interrupt)
     assert command("view", swing_up.npz).status == 130

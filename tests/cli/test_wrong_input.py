@@ -86,11 +86,14 @@ def test_scenario_that_is_not_there(command, tmp_path):
 def test_outputs_are_checked_before_the_run(command, tmp_path, monkeypatch):
     monkeypatch.setattr("densarm.closed_loop.simulate", pytest.fail)
     missing = tmp_path / "missing" / "run.npz"
-    for option in ("--save", "--html", "--json", "--plot"):
+    for option in ("--save", "--html", "--json", "--plot", "--png", "--gif"):
         done = command("run", "swing_up", option, missing)
         refused(done, tmp_path, option, str(missing), "does not exist")
         refused(command("run", "swing_up", option, tmp_path), tmp_path, option, "folder")
     refused(command("run", "swing_up", "--plot", tmp_path / "run.gif"), tmp_path, ".png")
+    refused(command("run", "swing_up", "--png", tmp_path / "run.jpg"), tmp_path, ".png")
+    refused(command("run", "swing_up", "--gif", tmp_path / "run.mp4"), tmp_path, ".gif")
+    refused(command("view", "any.npz", "--gif", missing), tmp_path, "--gif", str(missing))
     refused(command("verify", "any.npz", "--json", missing), tmp_path, "--json", str(missing))
     refused(command("bench", "step", "--json", missing), tmp_path, "--json", str(missing))
 

@@ -1,4 +1,4 @@
-"""A page in headless Chromium, driven over the DevTools protocol."""
+"""Recorded motions to show, and pages in headless Chromium, driven over the DevTools protocol."""
 
 import base64
 import itertools
@@ -18,6 +18,22 @@ from numpy.typing import NDArray
 from PIL import Image
 from websockets.sync.client import ClientConnection, connect
 
+from densarm.arm import Arm, load_arm
+from densarm.clearance import Clearance
+from densarm.outcome import Outcome
+from densarm.scenario import Scenario
+from densarm.scene import Box, Capsule, Cylinder, Scene, Sphere
+from densarm.trajectory import Trajectory
+
+SCENE = Scene(
+    [
+        Sphere(name="ball", radius=0.3, position=(1.5, 0.0, -0.5)),
+        Box(name="box", size=(0.5, 0.5, 0.5), position=(-1.5, 0.0, -0.5)),
+        Capsule(name="capsule", radius=0.2, length=0.5, position=(-1.5, 0.0, 1.0)),
+        Cylinder(name="cylinder", radius=0.2, length=0.5, position=(1.5, 0.0, 1.0)),
+    ]
+)
+DURATION = 4.0  # [s]
 PATIENCE = 60.0  # [s] for a page that draws without a graphics card on a busy machine
 
 FLAGS = (
@@ -32,6 +48,40 @@ FLAGS = (
     "--window-size=640,480",
     "--remote-debugging-port=0",
 )
+
+
+def record(arm: Arm, angles: NDArray[np.float64], duration: float, scene: Scene) -> Trajectory:
+    """A record of joint positions (N, nv) at equal steps of time, to the last of them."""
+    time = np.linspace(0.0, duration, len(angles))
+    q = arm.configurations(angles)
+    scenario = Scenario("swing", "Swing <b> & co", arm, scene, start=q[0], goal=q[-1])
+    clearance = Clearance(arm, scene)
+    rest = np.zeros((len(q), arm.nv))
+    smallest = [clearance.distances(each).min(initial=np.inf) for each in q]
+    return Trajectory(scenario, time, q, rest, rest, np.array(smallest), Outcome.TIMED_OUT, "late")
+
+
+@pytest.fixture(scope="session", name="record")
+def record_fixture() -> Callable[..., Trajectory]:
+    return record
+
+
+@pytest.fixture(scope="session")
+def two_link() -> Arm:
+    return load_arm("two_link")
+
+
+@pytest.fixture(scope="session")
+def swing(two_link: Arm) -> Trajectory:
+    """The two-link arm swings among obstacles of every kind."""
+    angle = np.linspace(0.0, 0.8 * np.pi, 401)
+    return record(two_link, np.column_stack([angle, -0.5 * angle]), DURATION, SCENE)
+
+
+@pytest.fixture(scope="session")
+def resting(two_link: Arm) -> Trajectory:
+    """One sample of an arm that has nothing around it."""
+    return record(two_link, np.array([[0.3, 0.3]]), 0.0, Scene())
 
 
 class Page:
@@ -99,7 +149,7 @@ class Page:
         return [event for event in self.events if event["method"] == method]
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="session")
 def open_page(
     chromium: str, tmp_path_factory: pytest.TempPathFactory
 ) -> Iterator[Callable[[str], Page]]:
@@ -108,7 +158,9 @@ def open_page(
     with running_browser(chromium, profile) as address, ExitStack() as stack:
 
         def open_url(url: str) -> Page:
-            page = Page(stack.enter_context(connect(new_page_address(address), max_size=None)))
+            # Pings would draw random numbers in a thread, which hypothesis forbids in other tests.
+            socket = connect(new_page_address(address), max_size=None, ping_interval=None)
+            page = Page(stack.enter_context(socket))
             page.open(url)
             return page
 

@@ -1,9 +1,12 @@
 import numpy as np
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from numpy.typing import NDArray
 
+from densarm.scene import Box, Scene
+from densarm.visualization.bodies import obstacle_bodies
 from densarm.visualization.camera import FIELD_OF_VIEW, Camera
 
 POINTS = arrays(np.float64, st.tuples(st.integers(2, 12), st.just(3)), elements=st.floats(-5, 5))
@@ -29,3 +32,17 @@ def test_planar_arm_is_seen_from_the_front() -> None:
     plane = np.array([[-2.0, -0.05, -2.0], [2.0, 0.05, 2.0], [2.0, 0.0, -2.0]])
     offset = Camera.facing(plane).offset
     assert -offset[1] > 5.0 * np.abs(offset[[0, 2]]).max()
+
+
+@pytest.mark.parametrize("side", [-1.0, 1.0])
+def test_camera_looks_past_a_wall(side):
+    cloud = np.array([[x, y, z] for x in (0.0, 1.0) for y in (0.0, 1.0) for z in (0.0, 1.0)])
+    wall = Box(name="wall", size=(4.0, 0.05, 4.0), position=(0.5, 0.5 + side, 0.5))
+    camera = Camera.facing(cloud, cloud, obstacle_bodies(Scene([wall])))
+    eye = camera.target + camera.offset
+    share = (wall.position[1] - cloud[:, 1:2]) / (eye - cloud)[:, 1:2]
+    crossing = (cloud + share * (eye - cloud))[:, [0, 2]]
+    is_hidden = (
+        (share[:, 0] > 0.0) & (share[:, 0] < 1.0) & (np.abs(crossing - 0.5) < 2.0).all(axis=1)
+    )
+    assert not is_hidden.any()

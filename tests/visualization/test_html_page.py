@@ -5,40 +5,23 @@ from typing import Any
 import numpy as np
 import pytest
 
-from densarm.arm import Arm, load_arm
+from densarm.arm import load_arm
 from densarm.errors import DensarmError
-from densarm.scene import Box, Capsule, Cylinder, Scene, Sphere
-from densarm.visualization.html_page import write_html
+from densarm.scene import Scene
+from densarm.trajectory import Trajectory
+from densarm.visualization.view import save_html
 
-SCENE = Scene(
-    [
-        Sphere(name="ball", radius=0.3, position=(1.5, 0.0, -0.5)),
-        Box(name="box", size=(0.5, 0.5, 0.5), position=(-1.5, 0.0, -0.5)),
-        Capsule(name="capsule", radius=0.2, length=0.5, position=(-1.5, 0.0, 1.0)),
-        Cylinder(name="cylinder", radius=0.2, length=0.5, position=(1.5, 0.0, 1.0)),
-    ]
-)
+OBSTACLES = ("ball", "box", "capsule", "cylinder")
 DURATION = 4.0  # [s]
 
 
-def swing(arm: Arm) -> tuple[np.ndarray, np.ndarray]:
-    time = np.linspace(0.0, DURATION, 401)
-    turn = 0.8 * np.pi * time / DURATION
-    return time, np.array([arm.configuration([angle, -0.5 * angle]) for angle in turn])
-
-
-def write(path: Path, **changes: Any) -> Path:
-    arm = load_arm("two_link")
-    time, q = swing(arm)
-    given = {"arm": arm, "scene": SCENE, "time": time, "q": q, "goal": q[-1], "title": "Swing"}
-    write_html(path, **{**given, **changes})
-    return path
-
-
 @pytest.fixture(scope="module")
-def page(open_page: Callable[[str], Any], tmp_path_factory: pytest.TempPathFactory) -> Any:
-    """The page of a swing, paused."""
-    file = write(tmp_path_factory.mktemp("page") / "swing.html", subtitle="a <b> & c")
+def page(
+    open_page: Callable[[str], Any], swing: Trajectory, tmp_path_factory: pytest.TempPathFactory
+) -> Any:
+    """The page of a swing, opened from disk and paused."""
+    file = tmp_path_factory.mktemp("page") / "swing.html"
+    save_html(swing, file)
     page = open_page(file.as_uri())
     page.wait_until("playing && time > 0")
     page.evaluate("button.click()")
@@ -53,47 +36,77 @@ def changed(page: Any, change: str) -> int:
     return int((np.abs(page.picture()[above_timeline] - before).max(axis=2) > 8).sum())
 
 
-def visible(path: list[str], value: bool) -> str:
-    command = {"type": "set_property", "path": "/".join(path), "property": "visible"}
-    return f"viewer.handle_command({{...{command}, value: {str(value).lower()}}})"
-
-
 @pytest.mark.parametrize(
-    "part", ["robot", "goal", "path", "floor", *(f"obstacles/{item.name}" for item in SCENE)]
+    "part", ["robot", "goal", "path", "floor", "closest", *(f"obstacles/{o}" for o in OBSTACLES)]
 )
 def test_every_part_is_seen(page: Any, part: str) -> None:
     page.evaluate("seek(1)")
-    node = ["meshcat", *part.split("/")]
-    assert changed(page, visible(node, value=False)) > 100
-    assert changed(page, visible(node, value=True)) > 100
+    assert changed(page, f"show('{part}', false)") > 50
+    page.evaluate(f"show('{part}', true)")
 
 
-def test_time_line_moves_the_arm(page: Any) -> None:
+@pytest.mark.parametrize("part", ["obstacles", "goal", "sensing"])
+def test_legend_shows_and_hides(page: Any, part: str) -> None:
+    page.evaluate("seek(1)")
+    click = f"document.querySelector('#legend input[value={part}]').click()"
+    before = page.picture()
+    assert changed(page, click) > 500
+    page.evaluate(click)
+    assert np.array_equal(page.picture(), before)
+
+
+def test_time_line_moves_the_arm_and_the_closest_pair(page: Any, swing: Trajectory) -> None:
     page.evaluate("seek(0)")
     scrub = f"slider.value = {DURATION / 2}; slider.dispatchEvent(new Event('input'))"
     assert changed(page, scrub) > 100
-    assert page.evaluate("clock.textContent") == "2.00 / 4.00 s"
+    assert page.evaluate("clock.textContent") == "2.000 / 4.000 s"
+    millimetres = f"{1e3 * np.interp(2.0, swing.time, swing.clearance):.1f} mm"
+    assert page.evaluate("label.textContent") == millimetres
+    words = page.evaluate("document.getElementById('closest').textContent")
+    assert words.startswith("closest: lower_link_0 and ")
+    assert words.endswith(millimetres)
+
+
+def test_distance_stands_beside_the_line(page: Any) -> None:
+    page.evaluate("seek(1)")
+    page.picture()
+    beside = """(() => {
+        const end = viewer.scene_tree.find(["meshcat", "closest", "second"]).object;
+        const at = end.getWorldPosition(new MeshCat.THREE.Vector3()).project(viewer.camera);
+        const box = label.getBoundingClientRect();
+        return [box.left - (at.x + 1) / 2 * innerWidth, (1 - at.y) / 2 * innerHeight - box.bottom];
+    })()"""
+    right, above = page.evaluate(beside)
+    assert 0.0 < right < 30.0
+    assert 0.0 < above < 30.0
 
 
 def test_arm_covers_its_goal_at_the_end(page: Any) -> None:
     page.evaluate(f"seek({DURATION})")
-    assert changed(page, visible(["meshcat", "goal"], value=False)) < 100
-    page.evaluate(visible(["meshcat", "goal"], value=True))
+    assert changed(page, "show('goal', false)") < 100
+    page.evaluate("show('goal', true)")
 
 
 def test_button_plays_and_pauses(page: Any) -> None:
     page.evaluate("seek(0)")
-    page.evaluate("button.click()")
+    assert changed(page, "button.click()") >= 0
     page.wait_until("time > 0.5")
-    page.evaluate("button.click()")
+    assert changed(page, "button.click()") > 0
     stopped = page.evaluate("time")
-    assert changed(page, "0") == 0
+    assert changed(page, "seek(0)") > 100
+    assert changed(page, f"seek({stopped})") > 100
     assert page.evaluate("time") == stopped
 
 
-def test_heading_is_shown_as_text(page: Any) -> None:
-    assert page.evaluate("document.querySelector('h1').textContent") == "Swing"
-    assert page.evaluate("document.querySelector('#heading p').textContent") == "a <b> & c"
+def test_heading_says_how_it_ended(page: Any) -> None:
+    heading = "document.querySelector('#heading')"
+    assert page.evaluate(f"{heading}.querySelector('h1').textContent") == "Swing <b> & co"
+    chips = page.evaluate(f"[...{heading}.querySelectorAll('span')].map(chip => chip.textContent)")
+    assert chips[0] == "timed out"
+    assert chips[1] == "4.000 s"
+    assert chips[2].startswith("smallest clearance ")
+    assert chips[3] == "not certified"
+    assert page.evaluate(f"{heading}.querySelector('p').textContent").endswith("late")
 
 
 def test_page_says_nothing_and_asks_nobody(page: Any) -> None:
@@ -103,32 +116,34 @@ def test_page_says_nothing_and_asks_nobody(page: Any) -> None:
 
 CORNERS_IN_PICTURE = """(() => {
     const box = new MeshCat.THREE.Box3();
-    for (const part of ["robot", "obstacles"])
-        box.expandByObject(viewer.scene_tree.find(["meshcat", part]).object);
+    box.expandByObject(viewer.scene_tree.find(["meshcat", "robot"]).object);
     return [box.min, box.max].map(corner => corner.project(viewer.camera).toArray());
 })()"""
 
 
-def test_single_sample_off_centre(open_page: Callable[[str], Any], tmp_path: Path) -> None:
-    arm = load_arm("two_link")
-    q = arm.configuration([0.3, 0.3])[None]
-    scene = Scene([Sphere(name="ball", radius=0.3, position=(1.5, 0.0, 0.5))])
-    file = write(tmp_path / "a.html", time=np.zeros(1), q=q, scene=scene, goal=q[0])
-    page = open_page(file.as_uri())
+def test_single_sample_without_pairs(
+    open_page: Callable[[str], Any], resting: Trajectory, tmp_path: Path
+) -> None:
+    save_html(resting, tmp_path / "a.html")
+    page = open_page((tmp_path / "a.html").as_uri())
     page.wait_until("playing")
-    assert changed(page, visible(["meshcat", "robot"], value=False)) > 100
+    assert changed(page, "show('robot', false)") > 100
     corners = np.array(page.evaluate(CORNERS_IN_PICTURE))
     assert np.all(np.abs(corners) < 1.0)
     np.testing.assert_allclose(corners[:, :2].sum(axis=0), 0.0, atol=0.3)
+    words = page.evaluate("document.getElementById('closest').textContent")
+    assert words == "closest: no pairs"
     assert page.complaints() == []
 
 
-def test_missing_folder(tmp_path: Path) -> None:
+def test_missing_folder(resting: Trajectory, tmp_path: Path) -> None:
     with pytest.raises(DensarmError, match="No such file or directory"):
-        write(tmp_path / "missing" / "run.html")
+        save_html(resting, tmp_path / "missing" / "run.html")
 
 
-def test_failure_leaves_the_old_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_failure_leaves_the_old_file(
+    resting: Trajectory, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     file = tmp_path / "run.html"
     file.write_text("old")
 
@@ -137,13 +152,13 @@ def test_failure_leaves_the_old_file(tmp_path: Path, monkeypatch: pytest.MonkeyP
 
     monkeypatch.setattr("os.replace", full)
     with pytest.raises(DensarmError, match="No space left"):
-        write(file)
+        save_html(resting, file)
     assert [item.name for item in tmp_path.iterdir()] == ["run.html"]
     assert file.read_text() == "old"
 
 
-def test_panda_fits_into_five_megabytes(tmp_path: Path) -> None:
+def test_panda_fits_into_five_megabytes(record: Callable[..., Trajectory], tmp_path: Path) -> None:
     arm = load_arm("panda")
-    q = np.array([arm.postures["ready"], arm.postures["ready"] + 0.1])
-    file = write(tmp_path / "a.html", arm=arm, time=np.array([0.0, 1.0]), q=q, goal=q[1])
-    assert file.stat().st_size < 5e6
+    ready = arm.angles(arm.postures["ready"])
+    save_html(record(arm, np.array([ready, ready + 0.1]), 1.0, Scene()), tmp_path / "a.html")
+    assert (tmp_path / "a.html").stat().st_size < 5e6

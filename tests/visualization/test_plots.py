@@ -3,12 +3,23 @@ import dataclasses
 import numpy as np
 import pytest
 
+from densarm.arm import Arm
 from densarm.errors import FileContentError, InvalidValueError
 from densarm.outcome import Outcome
+from densarm.robot_description import RobotDescription
 from densarm.scenario import Scenario, load_scenario
 from densarm.scene import Scene
 from densarm.trajectory import Trajectory
 from densarm.visualization.plots import run_figure, save_plot
+
+LIFT = """<robot name="lift">
+  <link name="base"><collision><geometry><box size="0.1 0.1 0.1"/></geometry></collision></link>
+  <link name="cabin"><inertial><mass value="1"/>
+    <inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial>
+    <collision><geometry><box size="0.1 0.1 0.1"/></geometry></collision></link>
+  <joint name="lift" type="prismatic"><parent link="base"/><child link="cabin"/>
+    <axis xyz="0 0 1"/><limit lower="-1" upper="1" effort="10" velocity="1"/></joint>
+</robot>"""
 
 
 @pytest.fixture(scope="module")
@@ -32,37 +43,93 @@ def swinging(scenario: Scenario, clearance: float) -> Trajectory:
     )
 
 
-def test_panels_show_the_record(scenario):
-    run = swinging(scenario, clearance=0.012)
-    position, velocity, torque, clearance = run_figure(run).axes
-    for axes, values in ((velocity, run.v), (torque, run.tau)):
-        for line, column in zip(axes.get_lines(), values.T, strict=False):
-            assert (line.get_ydata() == column).all()
+@pytest.fixture(scope="module")
+def run(scenario):
+    return swinging(scenario, clearance=0.012)
+
+
+@pytest.fixture(scope="module")
+def figure(run):
+    return run_figure(run)
+
+
+def axes_of(figure, ylabel):
+    return [axes for axes in figure.axes if axes.get_ylabel() == ylabel]
+
+
+def test_panels_show_the_record(run, figure):
+    velocities, torques = axes_of(figure, "[rad/s]"), axes_of(figure, "[N·m]")
+    for panels, values in ((velocities, run.v), (torques, run.tau)):
+        assert len(panels) == 2
+        for axes, column in zip(panels, values.T, strict=True):
+            assert (axes.get_lines()[0].get_ydata() == column).all()
+    (position,) = axes_of(figure, "shoulder\n[rad], no limit")
     assert position.get_lines()[0].get_ydata()[50] == pytest.approx(2.0 * np.sin(1.5))
-    assert (clearance.get_lines()[0].get_ydata() == run.clearance).all()
+    (clearance,) = axes_of(figure, "clearance [mm]")
+    assert clearance.get_lines()[0].get_ydata() == pytest.approx(1e3 * run.clearance)
     assert "smallest 12 mm at 0.00 s" in clearance.get_title(loc="right")
 
 
-def test_angles_are_drawn_without_jumps_at_half_a_turn(scenario):
-    run = swinging(scenario, clearance=0.1)
+def test_limits_are_in_sight_whatever_the_values_are(run, figure):
+    limits = run.scenario.arm.limits
+    for ylabel, bounds in (("[rad/s]", limits.velocity), ("[N·m]", limits.effort)):
+        for axes, bound in zip(axes_of(figure, ylabel), bounds, strict=True):
+            drawn = {line.get_ydata()[0] for line in axes.get_lines()[1:]}
+            assert drawn == {-bound, bound}
+            low, high = axes.get_ylim()
+            assert low < -bound < bound < high
+    assert axes_of(figure, "elbow\n[rad], no limit")
+
+
+def test_values_beyond_a_limit_are_in_sight(scenario):
+    beyond = swinging(scenario, clearance=0.1)
+    beyond = dataclasses.replace(beyond, v=2.0 * beyond.v)
+    shoulder, _ = axes_of(run_figure(beyond), "[rad/s]")
+    assert shoulder.get_ylim()[1] > 12.0
+
+
+def test_angles_are_drawn_without_jumps_at_half_a_turn(run, scenario):
     angles = np.column_stack([np.linspace(0.0, 9.0, 101), np.zeros(101)])
-    run = dataclasses.replace(run, q=scenario.arm.configurations(angles))
-    drawn = run_figure(run).axes[0].get_lines()[0].get_ydata()
-    assert drawn == pytest.approx(angles[:, 0])
+    turning = dataclasses.replace(run, q=scenario.arm.configurations(angles))
+    (position,) = axes_of(run_figure(turning), "shoulder\n[rad], no limit")
+    assert position.get_lines()[0].get_ydata() == pytest.approx(angles[:, 0])
 
 
-def test_only_limits_that_come_near_are_drawn(scenario):
-    figure = run_figure(swinging(scenario, clearance=0.1))
-    limits = {line.get_ydata()[0] for line in figure.axes[1].get_lines()[2:]}
-    assert limits == {-6.0, 6.0}
-    assert len(figure.axes[0].get_lines()) == 2  # continuous joints have no position limits
-    assert len(figure.axes[2].get_lines()) == 2  # torque stays far from its limits
+def test_density_is_that_to_the_goal(run, figure, scenario):
+    (line,) = (line for axes in axes_of(figure, "ln ρ") for line in axes.get_lines())
+    density = line.get_ydata()
+    assert len(density) == len(run.time)
+    # Far from the obstacles nothing but the goal acts: V of a sum of 1 - cos in κ = 1.
+    error = scenario.arm.difference(scenario.goal, run.q[50])
+    v = np.prod(2.0 - np.cos(error)) - 1.0
+    assert density[50] == pytest.approx(-np.log(v))
+
+
+def test_joint_space_has_the_motion_between_start_and_goal(figure):
+    (axes,) = (axes for axes in figure.axes if axes.get_title().startswith("joint space"))
+    motion, start, goal = axes.get_lines()
+    assert motion.get_xdata()[50] == pytest.approx(2.0 * np.sin(1.5))
+    assert (start.get_xdata()[0], start.get_ydata()[0]) == (0.0, 0.0)
+    assert goal.get_xdata()[0] == pytest.approx(np.pi)
+    low, high = axes.get_xlim()
+    assert high - low == pytest.approx(2.0 * np.pi)
+    assert axes.get_xlabel() == "shoulder [rad]"
 
 
 def test_run_without_pairs(scenario):
     alone = dataclasses.replace(scenario, scene=Scene())
-    clearance = run_figure(swinging(alone, clearance=np.inf)).axes[3]
+    figure = run_figure(swinging(alone, clearance=np.inf))
+    (clearance,) = axes_of(figure, "clearance [mm]")
     assert [text.get_text() for text in clearance.texts] == ["no pairs"]
+
+
+def test_arm_of_other_joints_has_no_joint_space(record):
+    arm = Arm(RobotDescription(name="lift", urdf=LIFT))
+    figure = run_figure(record(arm, np.array([[0.0], [0.3]]), 1.0, Scene()))
+    assert axes_of(figure, "lift\n[m]")
+    assert axes_of(figure, "[m/s]")
+    assert axes_of(figure, "[N]")
+    assert not any(axes.get_title().startswith("joint space") for axes in figure.axes)
 
 
 def test_other_endings_are_refused(scenario, tmp_path):

@@ -1,0 +1,159 @@
+"""A stage, drawn by meshcat's commands."""
+
+from typing import Any
+
+import meshcat
+import meshcat.animation
+import meshcat.geometry
+import numpy as np
+import pinocchio as pin
+
+from densarm.arrays import Array
+from densarm.visualization import palette
+from densarm.visualization.bodies import Body
+from densarm.visualization.camera import FIELD_OF_VIEW
+from densarm.visualization.palette import Color, hexadecimal
+from densarm.visualization.stage import Stage
+from densarm.visualization.triangle_mesh import TriangleMesh
+
+_SKY, _HORIZON = [1.0, 1.0, 1.0], [0.86, 0.89, 0.92]
+_LIGHTS = {"AmbientLight": 0.5, "FillLight": 0.3}  # meshcat's own values bleach light colours
+
+
+class MeshGeometry(meshcat.geometry.Geometry):
+    """A triangle mesh as three.js reads it.
+
+    Args:
+        mesh: the triangles.
+    """
+
+    def __init__(self, mesh: TriangleMesh) -> None:
+        super().__init__()
+        self.mesh = mesh
+
+    def lower(self, object_data: dict[str, Any]) -> dict[str, Any]:  # noqa: ARG002
+        """Return the mesh's arrays; the viewer finds the normals of a smooth mesh by itself."""
+        mesh, pack = self.mesh, meshcat.geometry.pack_numpy_array
+        attributes = {"position": pack(mesh.vertices.T)}
+        if not mesh.is_smooth:
+            attributes["normal"] = pack(mesh.normals.T)
+        if mesh.colors is not None:
+            attributes["color"] = pack(mesh.colors.T)
+        index = pack(mesh.faces.astype(np.uint32).T)
+        data = {"attributes": attributes, "index": index}
+        return {"uuid": self.uuid, "type": "BufferGeometry", "data": data}
+
+
+def draw(stage: Stage, viewer: meshcat.Visualizer) -> None:
+    """Draw a stage with its motion as an animation, the sensing region hidden.
+
+    Args:
+        stage: what to draw.
+        viewer: where to.
+    """
+    _draw_surroundings(viewer, stage)
+    _place_camera(viewer, stage)
+    geometries = {body.name: MeshGeometry(body.mesh) for body in stage.robot}
+    for body in stage.robot:
+        node = viewer["robot"][stage.joints[body.joint]][body.name]
+        _draw_body(node, body, geometries[body.name], color=hexadecimal(body.color))
+        node = viewer["goal"][stage.joints[body.joint]][body.name]
+        _draw_body(node, body, geometries[body.name], **_goal_look())
+    _draw_obstacles(viewer, stage)
+    _place_joints(viewer["robot"], stage, stage.q[0])
+    _place_joints(viewer["goal"], stage, stage.run.scenario.goal)
+    if stage.path is not None:
+        look = meshcat.geometry.MeshBasicMaterial(vertexColors=True)
+        viewer["path"].set_object(MeshGeometry(stage.path), look)
+    look = meshcat.geometry.MeshBasicMaterial(color=hexadecimal(palette.CLOSEST))
+    for name, (mesh, transforms) in stage.closest_line.items():
+        viewer["closest"][name].set_object(MeshGeometry(mesh), look)
+        viewer["closest"][name].set_transform(transforms[0])
+    viewer.set_animation(_animation(viewer, stage), play=False)
+
+
+def _draw_body(
+    node: meshcat.Visualizer, body: Body, geometry: meshcat.geometry.Geometry, **look: Any
+) -> None:
+    node.set_object(geometry, meshcat.geometry.MeshPhongMaterial(**look))
+    node.set_transform(body.placement.homogeneous)
+
+
+def _goal_look() -> dict[str, Any]:
+    return {
+        "color": hexadecimal(palette.GOAL),
+        "opacity": palette.GOAL_OPACITY,
+        "side": 0,
+        "depthWrite": False,
+        # The arm at its goal covers its copy instead of flickering with it.
+        "polygonOffset": True,
+        "polygonOffsetFactor": 1.0,
+        "polygonOffsetUnits": 1.0,
+    }
+
+
+def _draw_obstacles(viewer: meshcat.Visualizer, stage: Stage) -> None:
+    for group, bodies, opacity in (
+        ("obstacles", stage.obstacles, palette.OBSTACLE_OPACITY),
+        ("sensing", stage.sensing, palette.SENSING_OPACITY),
+    ):
+        for body in bodies:
+            look = {"color": hexadecimal(body.color), "opacity": opacity}
+            node = viewer[group][body.name]
+            _draw_body(node, body, MeshGeometry(body.mesh), side=0, depthWrite=False, **look)
+            if group == "obstacles" and len(body.mesh.edges):
+                _draw_lines(node["edges"], body.mesh.edges, palette.EDGE)
+    viewer["sensing"].set_property("visible", False)
+
+
+def _draw_lines(node: meshcat.Visualizer, lines: Array, color: Color) -> None:
+    ends = meshcat.geometry.PointsGeometry(lines.reshape(-1, 3).T)
+    look = meshcat.geometry.LineBasicMaterial(color=hexadecimal(color))
+    node.set_object(meshcat.geometry.LineSegments(ends, look))
+
+
+def _draw_surroundings(viewer: meshcat.Visualizer, stage: Stage) -> None:
+    background = viewer["/Background"]
+    background.set_property("top_color", _SKY)
+    background.set_property("bottom_color", _HORIZON)
+    for node in ("/Axes", "/Grid"):
+        viewer[node].set_property("visible", False)
+    for light, intensity in _LIGHTS.items():
+        viewer[f"/Lights/{light}/<object>"].set_property("intensity", intensity)
+    _draw_lines(viewer["floor"], stage.floor, palette.FLOOR)
+
+
+def _place_camera(viewer: meshcat.Visualizer, stage: Stage) -> None:
+    # The camera always looks at its node's origin, so the drawing moves instead.
+    shift = np.eye(4)
+    shift[:3, 3] = -stage.camera.target
+    viewer.set_transform(shift)
+    lens = viewer["/Cameras/default/rotated/<object>"]
+    lens.set_property("fov", FIELD_OF_VIEW)
+    x, y, z = stage.camera.offset.tolist()
+    lens.set_property("position", [x, z, -y])  # this node has y upwards
+
+
+def _place_joints(node: meshcat.Visualizer, stage: Stage, q: Array) -> None:
+    for name, pose in zip(stage.joints, stage.joint_poses(q), strict=True):
+        node[name].set_transform(pose.homogeneous)
+
+
+def _animation(viewer: meshcat.Visualizer, stage: Stage) -> meshcat.animation.Animation:
+    """Return the motion of the joints for meshcat's time line, which counts seconds."""
+    poses = np.array([[pin.SE3ToXYZQUAT(pose) for pose in stage.joint_poses(q)] for q in stage.q])
+    seconds = stage.time.tolist()
+    animation = meshcat.animation.Animation()
+    for joint, name in list(enumerate(stage.joints))[1:]:
+        tracks = {
+            "position": ("vector3", poses[:, joint, :3]),
+            "quaternion": ("quaternion", poses[:, joint, 3:]),
+        }
+        animation.clips[viewer["robot"][name].path] = meshcat.animation.AnimationClip(
+            {
+                key: meshcat.animation.AnimationTrack(key, kind, seconds, values.tolist())
+                for key, (kind, values) in tracks.items()
+            },
+            fps=1,
+        )
+    return animation

@@ -1,0 +1,213 @@
+"""Rasterizer: triangles to pixels without a graphics card, by a depth buffer."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from densarm.arrays import Array
+from densarm.compiled import compiled
+from densarm.errors import InvalidValueError
+from densarm.visualization.camera import FIELD_OF_VIEW, Camera
+from densarm.visualization.triangle_mesh import TriangleMesh
+
+_SAMPLES = 2  # along each side of a pixel
+_NEAREST = 1e-3  # [m] before the camera, from where on a triangle is drawn
+_LIGHTS = np.array([[-0.45, 0.75, 0.85, 0.62], [0.75, 0.25, 0.6, 0.28]])  # camera axes, strength
+_AMBIENT = 0.34
+_SHINE, _GLOSS = 0.22, 24.0  # strength and exponent of highlights
+_UNLIT = 1e-6  # length of a normal below which no light falls
+_LINE_LIFT = 1.003  # lines on a surface are drawn this much nearer
+
+
+class Rasterizer:
+    """A picture in the making.
+
+    Args:
+        camera: where to look from.
+        width: of the picture [pixels].
+        height: of the picture [pixels].
+    """
+
+    def __init__(self, camera: Camera, width: int, height: int) -> None:
+        self._camera = camera
+        shape = (_SAMPLES * height, _SAMPLES * width)
+        self._focus = shape[0] / 2.0 / np.tan(np.radians(FIELD_OF_VIEW) / 2.0)
+        self._image = np.ones((*shape, 3), dtype=np.float32)
+        self._nearness = np.zeros(shape, dtype=np.float32)
+        self._layer_nearness = np.zeros(shape, dtype=np.float32)
+        self._surface = np.zeros((*shape, 6), dtype=np.float32)
+        lights = _LIGHTS[:, :3] / np.linalg.norm(_LIGHTS[:, :3], axis=1, keepdims=True)
+        self._lights = np.column_stack([lights @ camera.axes, _LIGHTS[:, 3]])
+
+    def clear(self) -> None:
+        """Begin anew, on white."""
+        self._image.fill(1.0)
+        self._nearness.fill(0.0)
+
+    def fill(self, mesh: TriangleMesh, opacity: float = 1.0, lift: float = 1.0) -> None:
+        """Draw triangles, of which each pixel shows the nearest.
+
+        Args:
+            mesh: in the world frame, with colours; where normals are zero, no light falls.
+            opacity: 0 to 1; below 1 they hide nothing that is drawn later.
+            lift: how many times nearer they count than they are, against what else is there.
+        """
+        corners = self._project(mesh.vertices)
+        corners[:, 2] *= lift
+        self._draw(corners, mesh.faces, np.hstack([mesh.normals, _colors(mesh)]), opacity)
+
+    def lines(
+        self, ends: Array, color: tuple[float, float, float], width: float, opacity: float
+    ) -> None:
+        """Draw straight lines.
+
+        Args:
+            ends: (K, 2, 3) in the world frame [m].
+            color: red, green and blue, 0 to 1.
+            width: [pixels].
+            opacity: 0 to 1.
+        """
+        if len(ends) == 0:
+            return
+        seen = self._project(ends)
+        along = seen[:, 1, :2] - seen[:, 0, :2]
+        along /= np.maximum(np.linalg.norm(along, axis=1, keepdims=True), 1e-9)
+        aside = np.zeros_like(seen)
+        aside[:, :, :2] = (along[:, ::-1] * [1.0, -1.0] * _SAMPLES * width / 2.0)[:, np.newaxis]
+        left, right = seen + aside, seen - aside
+        corners = np.concatenate([left, right], axis=1).reshape(-1, 3)
+        corners[:, 2] *= _LINE_LIFT
+        halves = np.array([[0, 1, 2], [2, 1, 3]], dtype=np.int64)
+        faces = (4 * np.arange(len(ends))[:, np.newaxis, np.newaxis] + halves).reshape(-1, 3)
+        attributes = np.tile([0.0, 0.0, 0.0, *color], (len(corners), 1))
+        self._draw(corners, faces, attributes, opacity)
+
+    def pixels(self) -> NDArray[np.uint8]:
+        """Return the picture (height, width, 3)."""
+        every = [slice(first, None, _SAMPLES) for first in range(_SAMPLES)]
+        total = sum(self._image[rows, columns] for rows in every for columns in every)
+        return np.asarray(np.round(total * (255.0 / _SAMPLES**2)), dtype=np.uint8)
+
+    def position(self, point: Array) -> tuple[float, float]:
+        """Return column and row of a point (3,) of the world [m], from the top left [pixels]."""
+        x, y, _ = self._project(point[np.newaxis])[0] / _SAMPLES
+        return float(x), float(y)
+
+    def _project(self, points: Array) -> Array:
+        """Return column, row and nearness (..., 3) of points (..., 3), nearness = 1 / depth."""
+        camera = self._camera
+        seen = (points - camera.target - camera.offset) @ camera.axes.T
+        nearness = 1.0 / np.where(seen[..., 2] < -_NEAREST, -seen[..., 2], np.nan)
+        rows, columns = self._nearness.shape
+        x = columns / 2.0 + self._focus * seen[..., 0] * nearness
+        y = rows / 2.0 - self._focus * seen[..., 1] * nearness
+        return np.stack([x, y, nearness], axis=-1)
+
+    def _draw(
+        self, corners: Array, faces: NDArray[np.int64], attributes: Array, opacity: float
+    ) -> None:
+        self._layer_nearness[:] = self._nearness
+        rows = _fill(corners, faces, attributes, self._layer_nearness, self._surface)
+        _shade(
+            *rows, self._nearness, self._layer_nearness, self._surface, self._lights,
+            self._camera.axes[2], opacity, self._image,
+        )  # fmt: skip
+        if opacity == 1.0:
+            self._nearness[:] = self._layer_nearness
+
+
+def _colors(mesh: TriangleMesh) -> Array:
+    if mesh.colors is None:
+        raise InvalidValueError("colors of the mesh", None, "given")
+    return mesh.colors
+
+
+@compiled
+def _span(low: float, high: float, size: int) -> tuple[int, int]:
+    """Return the range of pixels whose centres are from low to high, inside the picture."""
+    first = int(np.ceil(min(max(low, 0.0), size) - 0.5))
+    last = int(np.floor(min(max(high, 0.0), size) - 0.5))
+    return max(first, 0), last + 1
+
+
+@compiled
+def _fill(
+    corners: Array,
+    faces: NDArray[np.int64],
+    attributes: Array,
+    nearness: NDArray[np.float32],
+    surface: NDArray[np.float32],
+) -> tuple[int, int]:
+    """Write the attributes of the nearest triangle of each pixel; return the rows written to."""
+    height, width = nearness.shape
+    top, bottom = height, 0
+    for t in range(faces.shape[0]):
+        a, b, c = faces[t, 0], faces[t, 1], faces[t, 2]
+        ax, ay, az = corners[a, 0], corners[a, 1], corners[a, 2]
+        bx, by, bz = corners[b, 0], corners[b, 1], corners[b, 2]
+        cx, cy, cz = corners[c, 0], corners[c, 1], corners[c, 2]
+        area = (bx - ax) * (cy - ay) - (by - ay) * (cx - ax)
+        if not abs(area) > 0.0:  # a corner behind the camera is NaN
+            continue
+        left, right = _span(min(ax, bx, cx), max(ax, bx, cx), width)
+        first, last = _span(min(ay, by, cy), max(ay, by, cy), height)
+        top, bottom = min(top, first), max(bottom, last)
+        for row in range(first, last):
+            y = row + 0.5
+            for column in range(left, right):
+                x = column + 0.5
+                u = ((bx - x) * (cy - y) - (by - y) * (cx - x)) / area
+                v = ((cx - x) * (ay - y) - (cy - y) * (ax - x)) / area
+                w = 1.0 - u - v
+                if u < 0.0 or v < 0.0 or w < 0.0:
+                    continue
+                near = u * az + v * bz + w * cz
+                if near > nearness[row, column]:
+                    nearness[row, column] = near
+                    for k in range(attributes.shape[1]):
+                        surface[row, column, k] = (
+                            u * attributes[a, k] + v * attributes[b, k] + w * attributes[c, k]
+                        )
+    return top, bottom
+
+
+@compiled
+def _reflected(normal: NDArray[np.float32], lights: Array, to_camera: Array) -> tuple[float, float]:
+    """Return how bright a surface's own colour is, and the highlight on it, by Blinn and Phong."""
+    length = np.sqrt(normal[0] ** 2 + normal[1] ** 2 + normal[2] ** 2)
+    if length < _UNLIT:
+        return 1.0, 0.0
+    facing = normal[0] * to_camera[0] + normal[1] * to_camera[1] + normal[2] * to_camera[2]
+    side = (1.0 if facing >= 0.0 else -1.0) / length
+    light, shine = _AMBIENT, 0.0
+    for k in range(lights.shape[0]):
+        cosine, middle, half = 0.0, 0.0, 0.0
+        for axis in range(3):
+            cosine += side * normal[axis] * lights[k, axis]
+            middle += (lights[k, axis] + to_camera[axis]) ** 2
+            half += side * normal[axis] * (lights[k, axis] + to_camera[axis])
+        light += lights[k, 3] * max(cosine, 0.0)
+        shine += lights[k, 3] * _SHINE * max(half / np.sqrt(middle), 0.0) ** _GLOSS
+    return light, shine
+
+
+@compiled
+def _shade(
+    top: int,
+    bottom: int,
+    before: NDArray[np.float32],
+    after: NDArray[np.float32],
+    surface: NDArray[np.float32],
+    lights: Array,
+    to_camera: Array,
+    opacity: float,
+    image: NDArray[np.float32],
+) -> None:
+    """Blend the light that new pixels send to the camera into the image."""
+    for row in range(top, bottom):
+        for column in range(image.shape[1]):
+            if after[row, column] <= before[row, column]:
+                continue
+            light, shine = _reflected(surface[row, column, :3], lights, to_camera)
+            for channel in range(3):
+                color = min(1.0, surface[row, column, 3 + channel] * light + shine)
+                image[row, column, channel] += opacity * (color - image[row, column, channel])

@@ -1,0 +1,40 @@
+"""What is drawn of obstacles and of what the arm holds."""
+
+import coal
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from densarm.attachment import Attachment
+from densarm.scene import HalfSpace, Mesh, Scene, Sphere
+from densarm.visualization.bodies import WORLD, arm_bodies, obstacle_bodies, sensing_bodies
+
+TETRAHEDRON = ((0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+
+
+def test_half_space_is_a_board_below_its_surface():
+    wall = HalfSpace(name="wall", normal=(2.0, 0.0, 0.0), offset=-0.3, position=(1.0, 5.0, 5.0))
+    (board,) = obstacle_bodies(Scene([wall]))
+    corners = board.mesh.vertices @ board.placement.rotation.T + board.placement.translation
+    low, high = corners.min(axis=0), corners.max(axis=0)
+    assert high[0] == pytest.approx(0.7)
+    assert (high - low)[1:].min() > 100 * (high - low)[0]
+    assert not board.has_end
+    assert sensing_bodies(Scene([wall]), 0.1) == ()
+
+
+def test_each_piece_of_a_mesh_is_drawn():
+    pieces = obstacle_bodies(Scene([Mesh(name="mug", pieces=(TETRAHEDRON, TETRAHEDRON))]))
+    assert [piece.name for piece in pieces] == ["mug.0", "mug.1"]
+    assert all(piece.joint == WORLD and piece.has_end for piece in pieces)
+
+
+def test_held_body_moves_with_its_link(two_link):
+    ball = Sphere(name="ball", radius=0.1, position=(0.0, 0.0, -0.5))
+    arm = two_link.holding(Attachment(ball, "lower_link"))
+    (held,) = [body for body in arm_bodies(arm) if body.name == "ball"]
+    assert arm.model.names[held.joint] == "elbow"
+    assert isinstance(held.shape, coal.Sphere)
+    pin.forwardKinematics(arm.model, arm.data, arm.configuration([np.pi / 2, 0.0]))
+    middle = held.corners(list(arm.data.oMi)).mean(axis=0)
+    np.testing.assert_allclose(middle, [1.5, 0.0, 0.0], atol=1e-9)

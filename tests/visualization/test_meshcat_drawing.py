@@ -1,0 +1,108 @@
+from typing import Any
+
+import meshcat
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from densarm.arm import Arm
+from densarm.robot_description import RobotDescription
+from densarm.scene import Scene
+from densarm.visualization.meshcat_drawing import draw
+from densarm.visualization.stage import Stage
+
+NO_VISUALS = """
+<robot name="bare">
+  <link name="base"><collision><geometry><box size="0.1 0.1 0.1"/></geometry></collision></link>
+  <link name="arm">
+    <inertial>
+      <mass value="1"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/>
+    </inertial>
+    <collision>
+      <origin xyz="0 0 0.5"/><geometry><cylinder radius="0.1" length="0.6"/></geometry>
+    </collision>
+  </link>
+  <joint name="turn" type="revolute">
+    <parent link="base"/><child link="arm"/><axis xyz="1 0 0"/>
+    <limit lower="-1" upper="1" effort="1" velocity="1"/>
+  </joint>
+</robot>
+"""
+
+
+class Window:
+    """Keeps the commands that it is sent."""
+
+    def __init__(self) -> None:
+        self.commands: list[dict[str, Any]] = []
+
+    def send(self, command: Any) -> None:
+        self.commands.append(command.lower())
+
+    def of_type(self, kind: str) -> dict[str, dict[str, Any]]:
+        return {c["path"]: c for c in self.commands if c["type"] == kind}
+
+    def place(self, path: str) -> np.ndarray:
+        return np.reshape(self.of_type("set_transform")[path]["matrix"], (4, 4)).T
+
+
+def drawn(stage):
+    window = Window()
+    draw(stage, meshcat.Visualizer(window=window))
+    return window
+
+
+@pytest.fixture(scope="module")
+def stage(swing):
+    return Stage(swing)
+
+
+@pytest.fixture(scope="module")
+def window(stage):
+    return drawn(stage)
+
+
+def test_links_without_visuals_show_their_collision_shapes(record):
+    arm = Arm(RobotDescription(name="bare", urdf=NO_VISUALS))
+    objects = drawn(Stage(record(arm, np.zeros((2, 1)), 1.0, Scene()))).of_type("set_object")
+    assert sorted(path for path in objects if "/robot/" in path) == [
+        "/meshcat/robot/turn/arm_0",
+        "/meshcat/robot/universe/base_0",
+    ]
+
+
+def test_goal_shares_the_meshes_of_the_robot(window):
+    objects = {path: c["object"] for path, c in window.of_type("set_object").items()}
+    goal = {path: item for path, item in objects.items() if "/goal/" in path}
+    assert goal
+    for path, item in goal.items():
+        other = objects[path.replace("/goal/", "/robot/")]
+        assert item["object"]["geometry"] == other["object"]["geometry"]
+        assert item["materials"][0]["transparent"]
+
+
+def test_obstacles_and_their_sensing_regions_stand_where_the_scene_says(window, swing):
+    for obstacle in swing.scenario.scene:
+        for group in ("obstacles", "sensing"):
+            place = window.place(f"/meshcat/{group}/{obstacle.name}")
+            np.testing.assert_allclose(place[:3, 3], obstacle.position)
+
+
+def test_arm_starts_at_the_first_frame_and_the_ghost_is_at_the_goal(window, swing, two_link):
+    for group, q in (("robot", swing.q[0]), ("goal", swing.scenario.goal)):
+        (shoulder, _) = two_link.angles(q)
+        elbow = window.place(f"/meshcat/{group}/elbow")[:3, 3]
+        np.testing.assert_allclose(elbow, [np.sin(shoulder), 0, -np.cos(shoulder)], atol=1e-9)
+
+
+def test_animation_has_the_pose_of_every_joint_at_every_frame(window, stage, two_link):
+    (command,) = (c for c in window.commands if c["type"] == "set_animation")
+    clips = {c["path"]: c["clip"]["tracks"] for c in command["animations"]}
+    position, quaternion = clips["/meshcat/robot/elbow"]
+    assert [key["time"] for key in position["keys"]] == stage.time.tolist()
+    angles = two_link.angles(stage.q)
+    places = np.array([key["value"] for key in position["keys"]])
+    np.testing.assert_allclose(places[:, 0], np.sin(angles[:, 0]), atol=1e-9)
+    turns = [pin.Quaternion(np.array(key["value"])).matrix() for key in quaternion["keys"]]
+    expected = [stage.joint_poses(q)[2].rotation for q in stage.q]
+    np.testing.assert_allclose(turns, expected, atol=1e-9)
