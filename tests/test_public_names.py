@@ -1,4 +1,5 @@
 import ast
+import importlib
 import json
 import pkgutil
 import subprocess
@@ -38,7 +39,7 @@ def test_type_checkers_see_the_same_names():
     typed = typed_names()
     assert {*typed, "__version__"} == set(densarm.__all__)
     for name, module in typed.items():
-        assert getattr(sys.modules[module], name) is getattr(densarm, name)
+        assert getattr(importlib.import_module(module), name) is getattr(densarm, name)
 
 
 def test_unknown_name_is_an_attribute_error():
