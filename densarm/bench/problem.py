@@ -1,5 +1,6 @@
 """Problem: a start and a goal of an arm in a scene, as plain data that a process can be sent."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -8,8 +9,10 @@ import numpy as np
 from densarm.arm import Arm, load_arm
 from densarm.clear_configurations import clear_configurations
 from densarm.clearance import Clearance
+from densarm.errors import InvalidValueError
 from densarm.scenario import Scenario
 from densarm.scene import Scene
+from densarm.scene_files import MotionProblem
 from densarm.validation import non_negative_integer, positive_integer
 
 
@@ -30,14 +33,16 @@ class Problem:
     """Joint positions, one number per joint [rad or m]."""
     seed: int = 0
     """Of the planner."""
+    locked_joints: tuple[tuple[str, float], ...] = ()
+    """Names and positions of joints that stand still [rad or m]."""
 
     def scenario(self) -> Scenario:
         """Return the problem as a scenario with default parameters.
 
         Raises:
-            UnknownNameError: no such arm.
+            UnknownNameError: no such arm, or joint to lock.
         """
-        arm = _arm(self.arm)
+        arm = _arm(self.arm, self.locked_joints)
         name = f"{self.arm}_{self.scene_name}_{self.index}"
         return Scenario(
             name=name,
@@ -51,8 +56,39 @@ class Problem:
 
 
 @lru_cache(maxsize=1)
-def _arm(name: str) -> Arm:
-    return load_arm(name)
+def _arm(name: str, locked_joints: tuple[tuple[str, float], ...] = ()) -> Arm:
+    return load_arm(name, locked_joints=dict(locked_joints))
+
+
+def as_problems(collection: Iterable[MotionProblem]) -> list[Problem]:
+    """Return problems of MotionBenchMaker's collection.
+
+    Args:
+        collection: problems of robots that are known by name.
+
+    Raises:
+        UnknownNameError: no such robot, or joint to lock.
+        InvalidValueError: a problem does not give each joint of the robot one position.
+    """
+    return [_of_collection(problem) for problem in collection]
+
+
+def _of_collection(problem: MotionProblem) -> Problem:
+    locked = tuple(sorted(problem.locked_joints.items()))
+    names = _arm(problem.robot, locked).joint_names
+    if sorted(problem.joints) != sorted(names):
+        allowed = f"the joints of {problem.robot}, {', '.join(names)}"
+        raise InvalidValueError("metadata.joints", list(problem.joints), allowed)
+    order = [problem.joints.index(name) for name in names]
+    return Problem(
+        arm=problem.robot,
+        scene_name=problem.scene_name,
+        index=problem.index,
+        scene=problem.scene,
+        start=tuple(problem.start[k] for k in order),
+        goal=tuple(problem.goal[k] for k in order),
+        locked_joints=locked,
+    )
 
 
 def random_problems(arm: str, count: int, seed: int) -> list[Problem]:

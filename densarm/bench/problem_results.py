@@ -3,15 +3,20 @@
 import signal
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import partial
 from multiprocessing import get_context
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from densarm.bench.problem import Problem
 from densarm.closed_loop import simulate
+from densarm.errors import FileContentError
 from densarm.outcome import FAILED, RUN_ENDS, Outcome
+from densarm.scenario import GuideKind
+from densarm.trajectory import Trajectory
 from densarm.validation import positive_integer
 
 PERCENTILES = (50, 95, 98)
@@ -39,6 +44,8 @@ class ProblemResult:
     """Largest torque in units of its limit."""
     plan_time_s: float | None = None
     """Wall-clock time of planning [s]."""
+    path_length_rad: float | None = None
+    """Length of the way in joint space [rad or m]."""
     certified: bool = False
     """Whether the certificate holds in every part."""
 
@@ -65,6 +72,14 @@ class ProblemResults:
         found = [r.min_clearance_m for r in self.results if r.min_clearance_m is not None]
         return min(found, default=None)
 
+    def by_scene(self) -> "dict[str, ProblemResults]":
+        """Return the results of each set of problems, by its name."""
+        names = dict.fromkeys(r.scene for r in self.results)
+        return {
+            name: ProblemResults(tuple(r for r in self.results if r.scene == name))
+            for name in names
+        }
+
     def count(self, outcome: str) -> int:
         """Return the number of runs that ended so."""
         return sum(r.outcome == outcome for r in self.results)
@@ -84,18 +99,34 @@ class ProblemResults:
             "outcomes": {outcome: self.count(outcome) for outcome in RUN_ENDS},
             "plan_time_s": self.percentiles("plan_time_s"),
             "duration_s": self.percentiles("duration_s"),
+            "path_length_rad": self.percentiles("path_length_rad"),
             "min_clearance_m": self.min_clearance,
         }
 
 
+@dataclass(frozen=True)
+class RunOptions:
+    """How to run each problem of a set."""
+
+    guide: GuideKind = GuideKind.PATH
+    """What supplies the sub-goals."""
+    save_dir: Path | None = None
+    """Folder of the recorded runs, SCENE_INDEX.npz; a problem whose record is there already is
+    not run again. None to keep none."""
+
+
 def run_problems(
-    problems: Sequence[Problem], jobs: int = 1, on_progress: Callable[[str], None] = lambda _: None
+    problems: Sequence[Problem],
+    jobs: int = 1,
+    on_progress: Callable[[str], None] = lambda _: None,
+    options: RunOptions | None = None,
 ) -> ProblemResults:
     """Plan each problem, run its torque-driven closed loop and prove it.
 
     Args:
         problems: what to run.
         jobs: processes to run them in; 1 for this one.
+        options: see `RunOptions`.
         on_progress: told what is being done.
 
     Returns:
@@ -106,30 +137,61 @@ def run_problems(
         InvalidValueError: a number of processes below one.
     """
     results = []
-    for result in _results(problems, positive_integer("jobs", jobs)):
+    run = partial(run_problem, options=options or RunOptions())
+    for result in _results(run, problems, positive_integer("jobs", jobs)):
         results.append(result)
         on_progress(f"{len(results)} of {len(problems)} problems run")
     return ProblemResults(tuple(results))
 
 
-def _results(problems: Sequence[Problem], jobs: int) -> Iterator[ProblemResult]:
+def _results(
+    run: Callable[[Problem], ProblemResult], problems: Sequence[Problem], jobs: int
+) -> Iterator[ProblemResult]:
     if jobs == 1:
-        yield from map(run_problem, problems)
+        yield from map(run, problems)
         return
     # Ctrl-C reaches the whole group of processes: it ends these at once, and only this one tells.
     pool = ProcessPoolExecutor(
         jobs, get_context("spawn"), signal.signal, (signal.SIGINT, signal.SIG_DFL)
     )
     try:
-        yield from pool.map(run_problem, problems)
+        yield from pool.map(run, problems)
     finally:
         pool.shutdown(cancel_futures=True)
 
 
-def run_problem(problem: Problem) -> ProblemResult:
+def run_problem(problem: Problem, options: RunOptions) -> ProblemResult:
     """Plan a problem, run its closed loop and prove it; an error becomes a result."""
     try:
-        run = simulate(problem.scenario())
-        return ProblemResult(problem.scene_name, problem.index, detail=run.detail, **run.summary())
+        run = _run(problem, options)
+        return ProblemResult(
+            problem.scene_name,
+            problem.index,
+            detail=run.detail,
+            path_length_rad=_path_length(run),
+            **run.summary(),
+        )
     except (ValueError, ArithmeticError, RuntimeError) as error:
         return ProblemResult(problem.scene_name, problem.index, FAILED, str(error))
+
+
+def _run(problem: Problem, options: RunOptions) -> Trajectory:
+    """Return the problem's record, or run it."""
+    scenario = problem.scenario()
+    scenario = replace(scenario, control=replace(scenario.control, guide=options.guide))
+    if options.save_dir is None:
+        return simulate(scenario)
+    file = options.save_dir / f"{problem.scene_name}_{problem.index}.npz"
+    if file.is_file():
+        recorded = Trajectory.load(file)
+        if recorded.scenario.to_json() != scenario.to_json():
+            raise FileContentError(file, "the record of another problem: remove it, or its folder")
+        return recorded
+    run = simulate(scenario)
+    run.save(file)
+    return run
+
+
+def _path_length(run: Trajectory) -> float:
+    steps = run.scenario.arm.difference(run.q[:-1], run.q[1:])
+    return float(np.linalg.norm(steps, axis=1).sum())

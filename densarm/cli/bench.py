@@ -8,6 +8,7 @@ from densarm.cli.exit_status import ExitStatus
 from densarm.cli.json_file import write_json
 from densarm.cli.output_option import output_option
 from densarm.cli.progress import progress
+from densarm.errors import FileContentError
 
 
 @click.group(no_args_is_help=False)
@@ -18,6 +19,7 @@ def bench() -> None:
     Example:
       densarm bench step --arm panda --shapes hull --pairs 64 --json step.json
       densarm bench random --arm ur5 --problems 50 --jobs 2 --json random.json
+      densarm bench motionbenchmaker --problems panda.json --jobs 2 --json results.json
     """  # noqa: D301
 
 
@@ -104,4 +106,71 @@ def random(arm: str, problems: int, seed: int, jobs: int, json: Path | None) -> 
         if json:
             write_json(json, results.to_json())
     print_problems(results)
+    return ExitStatus.SUCCESS
+
+
+def _make_folder(path: Path) -> None:
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise FileContentError(path, error.strerror or "cannot be made") from None
+
+
+@bench.command()
+@click.option(
+    "--problems",
+    type=click.Path(path_type=Path, dir_okay=False),
+    required=True,
+    help="JSON file of problems.",
+)
+@click.option(
+    "--every",
+    type=click.IntRange(min=1),
+    default=1,
+    show_default=True,
+    help="Run one problem of so many.",
+)
+@click.option(
+    "--guide",
+    type=click.Choice(["path", "direct"]),
+    default="path",
+    show_default=True,
+    help="What supplies the sub-goals.",
+)
+@click.option("--jobs", type=click.IntRange(min=1), default=1, show_default=True, help="Processes.")
+@click.option(
+    "--save-dir",
+    type=click.Path(path_type=Path, file_okay=False),
+    help="Keep every run here; those that are here already are not run again.",
+)
+@output_option("--json", "FILE", "Write every problem's result and the figures as JSON.")
+def motionbenchmaker(
+    problems: Path, every: int, guide: str, jobs: int, save_dir: Path | None, json: Path | None
+) -> int:
+    """Run problems of MotionBenchMaker's collection.
+
+    Each problem is planned, run as a torque-driven closed loop, and proved. An interrupted
+    benchmark goes on where it was with the same --save-dir.
+
+    The exit status is 0 when all problems were run, whatever was reached.
+
+    \b
+    Example:
+      densarm bench motionbenchmaker --problems panda.json --every 10 --json results.json
+    """  # noqa: D301
+    with progress() as report:
+        report("loading")
+        from densarm.bench.problem import as_problems
+        from densarm.bench.problem_results import RunOptions, run_problems
+        from densarm.cli.problem_table import print_problem_sets
+        from densarm.scenario import GuideKind
+        from densarm.scene_files import load_problems
+
+        chosen = as_problems(load_problems(problems)[::every])
+        if save_dir:
+            _make_folder(save_dir)
+        results = run_problems(chosen, jobs, report, RunOptions(GuideKind(guide), save_dir))
+        if json:
+            write_json(json, results.to_json())
+    print_problem_sets(results)
     return ExitStatus.SUCCESS

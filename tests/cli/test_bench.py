@@ -1,8 +1,12 @@
 import json
 
+import numpy as np
 import pytest
 
 from densarm.bench.problem_results import ProblemResult
+from densarm.trajectory import Trajectory
+
+GOAL = [np.cos(0.5), np.sin(0.5)]  # of the shoulder
 
 
 @pytest.mark.parametrize(("arm", "pairs"), [("two_link", 4), ("panda", 20)])
@@ -32,9 +36,67 @@ def test_random_problems_are_counted_and_written(command, tmp_path):
 def test_problems_that_were_not_solved_are_named(command, monkeypatch):
     monkeypatch.setattr(
         "densarm.bench.problem_results.run_problem",
-        lambda problem: ProblemResult("empty", problem.index, "no_path", "walls all round"),
+        lambda problem, **_: ProblemResult("empty", problem.index, "no_path", "walls all round"),
     )
     done = command("bench", "random", "--arm", "two_link", "--problems", 1)
     assert done.status == 0
     assert "empty 0 no_path: walls all round" in done.out
     assert "reached           0 of 1" in done.out
+
+
+@pytest.fixture
+def collection(tmp_path):
+    """One problem without obstacles, one whose start touches a ball."""
+    ball = {"type": "sphere", "name": "ball", "radius": 0.1, "position": [0.0, 0.0, -1.0]}
+    ends = {"index": 3, "start": [0.0, 0.0], "goal": [-0.3, 0.5]}
+    data = {
+        "metadata": {"robot": "two_link", "joints": ["elbow", "shoulder"]},
+        "problems": [
+            {"scene": "empty", "obstacles": [], **ends},
+            {"scene": "ball", "obstacles": [ball], **ends},
+        ],
+    }
+    path = tmp_path / "problems.json"
+    path.write_text(json.dumps(data), encoding="utf-8")
+    return path
+
+
+def test_collection_is_run_and_kept(command, collection, tmp_path, monkeypatch):
+    path, runs = tmp_path / "results.json", tmp_path / "runs"
+    arguments = ["--problems", collection, "--save-dir", runs, "--json", path]
+    done = command("bench", "motionbenchmaker", *arguments)
+    assert (done.status, done.err) == (0, "")
+    data = json.loads(path.read_text(encoding="utf-8"))
+    assert (data["reached"], data["certified"], data["total"]) == (1, 1, 2)
+    assert [entry["outcome"] for entry in data["problems"]] == ["reached", "infeasible"]
+    assert sorted(file.name for file in runs.iterdir()) == ["ball_3.npz", "empty_3.npz"]
+    # The joints are those that the file names, in its order.
+    np.testing.assert_array_equal(Trajectory.load(runs / "empty_3.npz").scenario.goal[:2], GOAL)
+
+    monkeypatch.setattr("densarm.bench.problem_results.simulate", None)
+    again = command("bench", "motionbenchmaker", *arguments)
+    assert (again.status, again.out) == (0, done.out)
+
+
+def test_record_of_another_problem_is_not_taken(command, collection, tmp_path):
+    runs = tmp_path / "runs"
+    arguments = ["bench", "motionbenchmaker", "--problems", collection, "--save-dir", runs]
+    command(*arguments, "--guide", "direct")
+    done = command(*arguments)
+    assert done.status == 0
+    assert "empty 3 failed" in done.out
+    assert "another problem" in done.out
+
+
+def test_one_of_so_many(command, collection):
+    done = command("bench", "motionbenchmaker", "--problems", collection, "--every", 2)
+    assert "empty" in done.out
+    assert "ball" not in done.out
+
+
+def test_robot_of_other_joints(command, collection):
+    collection.write_text(collection.read_text().replace("elbow", "wrist"), encoding="utf-8")
+    done = command("bench", "motionbenchmaker", "--problems", collection)
+    assert done.status == 2
+    assert "wrist" in done.err
+    assert len(done.err.splitlines()) == 1
