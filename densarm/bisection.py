@@ -25,6 +25,10 @@ class Bisection:
     """Parameter at or after which they failed; NaN when clear."""
     in_contact: bool
     """Whether they are in contact there, and not merely unproved."""
+    smallest: float
+    """Smallest slack that was met [m]; infinite without pairs."""
+    smallest_at: float
+    """Parameter at which it was met."""
 
 
 def bisect(
@@ -48,11 +52,11 @@ def bisect(
         n_pairs: the pairs are 0 to n_pairs - 1.
     """
     every = np.arange(n_pairs)
-    evaluated = list(ends)
     slack_first, slack_last = (slack(t, every) for t in ends)
+    met = {t: _least(values) for t, values in zip(ends, (slack_first, slack_last), strict=True)}
     for t, values in zip(ends, (slack_first, slack_last), strict=True):
         if (values <= 0.0).any():
-            return _failure(evaluated, every[values <= 0.0], t, in_contact=True)
+            return _bisection(met, every[values <= 0.0], t, in_contact=True)
     newest_first = count(0, -1)
     pending = [(0.0, next(newest_first), *ends, slack_first, slack_last, every)]
     while pending:
@@ -63,16 +67,23 @@ def bisect(
         pairs, slack_a, slack_b = pairs[near], slack_a[near], slack_b[near]
         middle = split(a, b)
         if middle is None:
-            return _failure(evaluated, pairs, a, in_contact=False)
-        evaluated.append(middle)
+            return _bisection(met, pairs, a, in_contact=False)
         slack_middle = slack(middle, pairs)
+        met[middle] = _least(slack_middle)
         if (slack_middle <= 0.0).any():
-            return _failure(evaluated, pairs[slack_middle <= 0.0], middle, in_contact=True)
+            return _bisection(met, pairs[slack_middle <= 0.0], middle, in_contact=True)
         for half in ((a, middle, slack_a, slack_middle), (middle, b, slack_middle, slack_b)):
             nearness = float((half[2] + half[3]).min())
             heappush(pending, (nearness, next(newest_first), *half, pairs))
-    return Bisection(np.unique(evaluated), every[:0], np.nan, in_contact=False)
+    return _bisection(met, every[:0], np.nan, in_contact=False)
 
 
-def _failure(evaluated: list[float], pairs: Pairs, at: float, *, in_contact: bool) -> Bisection:
-    return Bisection(np.unique(evaluated), pairs, at, in_contact)
+def _least(slack: Array) -> float:
+    return float(slack.min(initial=np.inf))
+
+
+def _bisection(
+    met: dict[float, float], failing: Pairs, at: float, *, in_contact: bool
+) -> Bisection:
+    nearest = min(met, key=met.__getitem__)
+    return Bisection(np.unique(list(met)), failing, at, in_contact, met[nearest], nearest)

@@ -86,7 +86,7 @@ def placements(bodies: MovingHulls) -> Placements:
 
 @compiled
 def near_pairs(
-    bodies: MovingHulls, at_a: Placements, at_b: Placements, motion: Array, kept: float
+    bodies: MovingHulls, at_a: Placements, at_b: Placements, motion: Array, kept: Array
 ) -> NDArray[np.int64]:
     """Return the pairs that enclosing balls and boxes do not prove apart.
 
@@ -95,7 +95,7 @@ def near_pairs(
         at_a: placements at one end of a motion.
         at_b: placements at the other end.
         motion: bounds on how far bodies move against each other in between (K,) [m].
-        kept: distance to be kept [m].
+        kept: distances to be kept (K,) [m].
     """
     near, count = np.empty(motion.size, np.int64), 0
     pairs, ball, half_side = bodies.pairs, bodies.ball, bodies.half_side
@@ -103,7 +103,7 @@ def near_pairs(
         i, j = pairs[pair, 0], pairs[pair, 1]
         apart_a = _apart(at_a.rotation, at_a.translation, half_side, ball, i, j)
         apart_b = _apart(at_b.rotation, at_b.translation, half_side, ball, i, j)
-        apart = apart_a + apart_b - 2.0 * kept
+        apart = apart_a + apart_b - 2.0 * kept[pair]
         if not apart > motion[pair]:
             near[count] = pair
             count += 1

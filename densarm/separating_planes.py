@@ -52,6 +52,16 @@ class SeparatingPlanes:
             q_b: the other end (nq,), reached the short way round on continuous joints.
         """
         step = self._arm.difference(q_a, q_b)
+        return self.tube_is_clear(self._arm.angles(q_a), step, np.zeros_like(step))
+
+    def tube_is_clear(self, angles: Array, step: Array, radius: Array) -> bool:
+        """Return whether every distance is proved above the margin on and around a segment.
+
+        Args:
+            angles: joint positions at one end (nv,) [rad or m].
+            step: from there to the other end (nv,) [rad or m].
+            radius: how far each joint may be off the segment (nv,) [rad or m].
+        """
         motion = self._lever @ np.abs(step)
         longest = float(np.abs(step).max())
         depth = 0 if longest <= _FLOOR else int(np.ceil(np.log2(longest / _FLOOR)))
@@ -60,10 +70,10 @@ class SeparatingPlanes:
                 self._bodies,
                 *self._placements,
                 self._corners,
-                self._arm.angles(q_a),
+                angles,
                 step,
                 motion,
-                self._kept,
+                self._kept + self._lever @ radius,
                 depth,
             )
         )
@@ -85,7 +95,7 @@ def _segment_is_clear(
     angles: Array,
     step: Array,
     motion: Array,
-    kept: float,
+    kept: Array,
     depth: int,
 ) -> bool:
     """Prove all pairs; arcs that two distances do not prove are halved, all of a length in turn."""
@@ -169,7 +179,7 @@ def _write_slack(
     at: Placements,
     corners: NDArray[np.int64],
     pair: NDArray[np.int64],
-    kept: float,
+    kept: Array,
     motion: Array,
     share: float,
     slack: Array,
@@ -181,7 +191,7 @@ def _write_slack(
         k = pair[n]
         i, j = pairs[k, 0], pairs[k, 1]
         write_relative(rotation, translation, i, j, between, offset)
-        held = kept + hulls.radius[i] + hulls.radius[j]
+        held = kept[k] + hulls.radius[i] + hulls.radius[j]
         enough = share * motion[k] + held
         slack[n] = separation(hulls, between, offset, enough, corners[k]) - held
         if not slack[n] > 0.0:

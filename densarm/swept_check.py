@@ -7,6 +7,7 @@ import numpy as np
 
 from densarm.arrays import Array
 from densarm.bisection import bisect
+from densarm.clearance import DISTANCE_TOLERANCE
 from densarm.swept_bound import SweptBound
 
 
@@ -27,11 +28,13 @@ class SweptResult:
 
     verdict: SweptVerdict
     index: int
-    """Sample at or after which it failed; -1 when clear."""
+    """Sample at or after which it failed; when clear, where the smallest distance was met."""
     pairs: tuple[tuple[str, str], ...]
     """The pairs in contact or undecided there; empty when clear."""
     evaluations: int
     """Configurations at which distances were computed."""
+    distance: float
+    """Smallest distance that was met there [m]; infinite without pairs."""
 
 
 class SweptCheck:
@@ -70,11 +73,13 @@ class SweptCheck:
             n_pairs=clearance.n_pairs,
         )
         evaluations = len(result.evaluated)
+        distance = result.smallest + self._bound.margin + DISTANCE_TOLERANCE
         if not len(result.failing):
-            return SweptResult(SweptVerdict.CLEAR, -1, (), evaluations)
+            nearest = int(result.smallest_at)
+            return SweptResult(SweptVerdict.CLEAR, nearest, (), evaluations, distance)
         verdict = SweptVerdict.CONTACT if result.in_contact else SweptVerdict.UNDECIDED
         pairs = tuple(clearance.pairs[k] for k in result.failing)
-        return SweptResult(verdict, int(result.failed_at), pairs, evaluations)
+        return SweptResult(verdict, int(result.failed_at), pairs, evaluations, distance)
 
 
 class _Polyline:

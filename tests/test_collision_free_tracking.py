@@ -63,5 +63,5 @@ def test_without_obstacles_in_the_density_it_is_not(name, form):
     assert blind.certified
     judged = replace(blind, scenario=scenario)
     failing = {check.name: check.detail for check in judged.verify().checks if not check.holds}
-    assert set(failing) == {"swept"}
+    assert set(failing) == {"swept", "stopping"}
     assert failing["swept"].startswith("contact")

@@ -64,10 +64,14 @@ def test_no_colliding_motion_is_certified():
 
 def test_clear_motions_are_certified():
     gaps = 10.0 ** np.random.default_rng(1).uniform(-4, -1, 300)
-    found = [result for result, _ in results(gaps)]
-    clear = [result for result in found if result.verdict == SweptVerdict.CLEAR]
+    found = list(results(gaps))
+    clear = [pair for pair in found if pair[0].verdict == SweptVerdict.CLEAR]
     assert len(clear) >= 0.99 * len(found)
-    assert all((result.index, result.pairs) == (-1, ()) for result in clear)
+    for result, distance in clear:
+        assert result.pairs == ()
+        # A smallest distance that was met, near the sample that it names.
+        assert distance.min() - 0.05 < result.distance
+        assert abs(distance[result.index] - result.distance) < 0.05
 
 
 def test_arcs_of_many_samples_are_proved_at_once():

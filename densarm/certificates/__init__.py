@@ -1,12 +1,11 @@
 """Certificates: what is proved about a recorded run."""
 
-from densarm.certificates.certificate import Certificate, Check, certify, swept_result
-from densarm.certificates.replay import replay_error
+from densarm.certificates.certificate import Certificate, Check, certify
+from densarm.certificates.replay import replay_errors
 
 __all__ = [
     "Certificate",
     "Check",
     "certify",
-    "replay_error",
-    "swept_result",
+    "replay_errors",
 ]

@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from densarm.certificates import certify, replay_error
+from densarm.certificates import certify, replay_errors
 from densarm.scene import Scene, Sphere
 
-PARTS = ["swept", "start", "goal", "limits", "replay"]
+PARTS = ["swept", "start", "goal", "limits", "replay", "stopping"]
 
 
 def failing(run):
@@ -109,8 +109,9 @@ def test_replay_error_is_the_rounding_of_an_honest_run(swing_up_run):
     run = swing_up_run
     simulation = run.scenario.simulation
     arm = run.scenario.arm
-    error = replay_error(arm, simulation.dt, simulation.integrator, run.q, run.v, run.tau)
-    assert error <= 1e-12
+    errors = replay_errors(arm, simulation.dt, simulation.integrator, run.q, run.v, run.tau)
+    assert errors.shape == (len(run.q) - 1,)
+    assert errors.max() <= 1e-12
 
 
 def test_obstacle_between_two_samples(swing_up_run):
@@ -125,10 +126,10 @@ def test_obstacle_between_two_samples(swing_up_run):
     )
     few["q"] = np.stack([scenario.start, scenario.goal])
     certificate = certify(scenario, run.time[:2], **few)
-    swept, replay = certificate.checks[0], certificate.checks[-1]
-    assert not swept.holds
-    assert "lower_link_0-pinhead" in swept.detail
-    assert not replay.holds
+    checks = dict(zip(PARTS, certificate.checks, strict=True))
+    assert not checks["swept"].holds
+    assert "lower_link_0-pinhead" in checks["swept"].detail
+    assert not checks["replay"].holds
 
 
 def test_obstacle_on_the_way(swing_up_run):
@@ -137,7 +138,7 @@ def test_obstacle_on_the_way(swing_up_run):
     tip = (np.sin(absolute).sum(), 0.0, -np.cos(absolute).sum())
     blocked = Scene([*run.scenario.scene, Sphere(name="late", radius=0.01, position=tip)])
     scenario = replace(run.scenario, scene=blocked)
-    assert failing(replace(run, scenario=scenario)) == {"swept"}
+    assert failing(replace(run, scenario=scenario)) == {"swept", "stopping"}
 
 
 def test_teleport(swing_up_run):

@@ -1,0 +1,100 @@
+"""StraightBrake: the shortest brake along a straight line of joint space within the limits."""
+
+import numpy as np
+import pinocchio as pin
+
+from densarm.arm import Arm
+from densarm.arrays import Array
+
+_SHARES = np.linspace(0.0, 1.0, 5)  # of the brake's time, at which torques are computed
+_GROWTH = 1.01  # of T at least, where torques exceed their limits
+_LARGEST_GROWTH = 2.0
+_ROUNDS = 40
+_ROUNDING = 1e-9  # relative, of torques at their limits
+
+
+class StraightBrake:
+    r"""Brakes from a state with q̈ antiparallel to q̇, so that the arm stays on a straight line.
+
+    .. math::
+
+        \dot q(t) = (1 - t/T)\, v, \qquad q(t) = q \oplus (t - t^2/2T)\, v, \qquad
+        \tau(t) = H(q(t), \dot q(t)) - M(q(t))\, v / T
+
+    T is the shortest found for which accelerations, and torques at five instants of the brake,
+    are within the limits. The arm comes to rest at q ⊕ T v / 2.
+
+    Args:
+        arm: its dynamics and limits.
+        share: of the acceleration and torque limits that the brake may use.
+    """
+
+    def __init__(self, arm: Arm, share: float = 1.0) -> None:
+        self._arm = arm
+        self._acceleration = share * arm.limits.acceleration
+        self._effort = share * arm.limits.effort * (1.0 + _ROUNDING)
+        self._pool = pin.ModelPool(arm.model, 1)
+
+    def duration(self, q: Array, v: Array) -> float:
+        """Return T [s] from one state, q (nq,) and v (nv,); as `durations`."""
+        return float(self.durations(q[np.newaxis], v[np.newaxis])[0])
+
+    def durations(self, q: Array, v: Array) -> Array:
+        """Return T (N,) [s] from each state; zero at rest, infinite where no brake was found.
+
+        Args:
+            q: configurations (N, nq).
+            v: velocities (N, nv) [rad/s or m/s].
+        """
+        angles = self._arm.angles(q)
+        duration = (np.abs(v) / self._acceleration).max(axis=1)
+        longer = np.flatnonzero(duration > 0.0)
+        for _ in range(_ROUNDS):
+            growth = self._growth(angles[longer], v[longer], duration[longer])
+            longer, growth = longer[growth > 1.0], growth[growth > 1.0]
+            if not longer.size:
+                return duration
+            duration[longer] *= growth
+        duration[longer] = np.inf
+        return duration
+
+    def travel(self, q: Array, v: Array) -> Array:
+        """Return how far the joints move until they rest (N, nv); arguments as `durations`."""
+        moving = (v != 0.0).any(axis=1)
+        travel = np.zeros_like(v)
+        travel[moving] = 0.5 * self.durations(q[moving], v[moving])[:, np.newaxis] * v[moving]
+        return travel
+
+    def _growth(self, angles: Array, v: Array, duration: Array) -> Array:
+        """Return the factors by which the durations (N,) must grow, one where torques hold."""
+        time = (_SHARES - 0.5 * _SHARES**2) * duration[:, np.newaxis]
+        theta = angles[:, np.newaxis] + time[..., np.newaxis] * v[:, np.newaxis]
+        q = self._arm.configurations(theta)
+        speed = (1.0 - _SHARES)[:, np.newaxis] * v[:, np.newaxis]
+        brake = np.broadcast_to((-v / duration[:, np.newaxis])[:, np.newaxis], speed.shape)
+        torque = self._torque(q, speed, brake)
+        growth = np.ones(len(v))
+        weak = ~(np.abs(torque) <= self._effort).all(axis=(1, 2))
+        if not weak.any():
+            return growth
+        held = self._torque(q[weak], speed[weak], np.zeros_like(speed[weak]))
+        growth[weak] = self._needed(held, torque[weak] - held)
+        return growth
+
+    def _needed(self, held: Array, brake: Array) -> Array:
+        """Return the growth of T by which |held + brake / growth| would come within the limits.
+
+        Args:
+            held: H along each brake (N, instants, nv).
+            brake: -M v / T there (N, instants, nv).
+        """
+        bound = np.where(brake > 0.0, self._effort, -self._effort) - held
+        with np.errstate(divide="ignore", invalid="ignore"):
+            share = np.where(brake != 0.0, bound / brake, np.inf).min(axis=(1, 2))
+            needed = np.where(share > 0.0, 1.0 / share, _LARGEST_GROWTH)
+        return np.clip(np.nan_to_num(needed, nan=_LARGEST_GROWTH), _GROWTH, _LARGEST_GROWTH)
+
+    def _torque(self, q: Array, v: Array, a: Array) -> Array:
+        """Return the torque (N, M, nv) of states and accelerations, each (N, M, ...)."""
+        columns = [np.asfortranarray(x.reshape(-1, x.shape[-1]).T) for x in (q, v, a)]
+        return np.asarray(pin.rneaInParallel(1, self._pool, *columns)).T.reshape(v.shape)
