@@ -16,6 +16,8 @@ from densarm.reference.reference import Reference
 from densarm.scenario import ControlForm, GuideKind, Scenario
 from densarm.separating_planes import SeparatingPlanes
 from densarm.simulation.fixed_step_loop import REACHED_POSITION
+from densarm.stopping_check import StoppingCheck
+from densarm.straight_brake import StraightBrake
 from densarm.swept_bound import SweptBound
 
 _LIMIT_INSET = 0.2 * REACHED_POSITION
@@ -26,6 +28,9 @@ _ROOM_SHARES = (1.0, 0.2)
 
 _END_SHARE = 0.5
 """Share of the clearance at start and goal that a path's margin may take."""
+
+_STOP_SHARE = 0.5
+"""Share of the smooth path's room that brakes keep too; the rest is for tracking errors."""
 
 
 @dataclass(frozen=True)
@@ -75,7 +80,8 @@ def plan_motion(
     guided.restart()
     kept = 0.5 * (path_bound.margin - control.margin) if path.is_clear else 0.0
     smooth_bound = bound.with_margin(control.margin + kept)
-    reference = _reference(scenario, smooth_bound, np.vstack([start, curve.q]))
+    stop_bound = bound.with_margin(control.margin + _STOP_SHARE * kept)
+    reference = _reference(scenario, smooth_bound, stop_bound, np.vstack([start, curve.q]))
     if reference is None:
         return NoPath("no smooth path near the planning system's curve is proved clear")
     return MotionPlan(guided, bound, reference)
@@ -109,7 +115,10 @@ def _weights(scenario: Scenario) -> Array | None:
     return np.asarray(inertia / inertia.max())
 
 
-def _reference(scenario: Scenario, bound: SweptBound, curve: Array) -> Reference | None:
+def _reference(
+    scenario: Scenario, bound: SweptBound, stop_bound: SweptBound, curve: Array
+) -> Reference | None:
+    """Return a smooth reference near a curve (N, nq) under one margin, its brakes under another."""
     arm, period = scenario.arm, scenario.simulation.control_period
     length = float(np.linalg.norm(arm.difference(curve[:-1], curve[1:]), axis=1).sum())
     if length == 0.0:
@@ -120,4 +129,9 @@ def _reference(scenario: Scenario, bound: SweptBound, curve: Array) -> Reference
     from densarm.reference.timing import time_path
 
     path = smooth_path(bound, curve)
-    return None if path is None else time_path(arm, path, length, period, scenario.timing)
+    if path is None:
+        return None
+    shares = scenario.timing
+    brake = StraightBrake(arm, shares.acceleration_share, shares.torque_share)
+    stopping = StoppingCheck(stop_bound, brake)
+    return time_path(arm, path, length, period, shares, stopping)

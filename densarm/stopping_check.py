@@ -28,9 +28,14 @@ class StoppingResult:
     """Whether it is proved clear (N,)."""
 
     @property
+    def holds(self) -> NDArray[np.bool_]:
+        """Whether stopping is proved (N,)."""
+        return np.isfinite(self.duration) & self.inside & self.clear
+
+    @property
     def failing(self) -> NDArray[np.int64]:
         """Samples from which stopping is not proved."""
-        return np.flatnonzero(~(np.isfinite(self.duration) & self.inside & self.clear))
+        return np.flatnonzero(~self.holds)
 
 
 class StoppingCheck:

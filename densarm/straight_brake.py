@@ -26,13 +26,16 @@ class StraightBrake:
 
     Args:
         arm: its dynamics and limits.
-        share: of the acceleration and torque limits that the brake may use.
+        acceleration_share: of the acceleration limits that the brake may use.
+        torque_share: of the torque limits that it may use.
     """
 
-    def __init__(self, arm: Arm, share: float = 1.0) -> None:
+    def __init__(
+        self, arm: Arm, acceleration_share: float = 1.0, torque_share: float = 1.0
+    ) -> None:
         self._arm = arm
-        self._acceleration = share * arm.limits.acceleration
-        self._effort = share * arm.limits.effort * (1.0 + _ROUNDING)
+        self._acceleration = acceleration_share * arm.limits.acceleration
+        self._effort = torque_share * arm.limits.effort * (1.0 + _ROUNDING)
         self._pool = pin.ModelPool(arm.model, 1)
 
     def duration(self, q: Array, v: Array) -> float:
@@ -57,13 +60,6 @@ class StraightBrake:
             duration[longer] *= growth
         duration[longer] = np.inf
         return duration
-
-    def travel(self, q: Array, v: Array) -> Array:
-        """Return how far the joints move until they rest (N, nv); arguments as `durations`."""
-        moving = (v != 0.0).any(axis=1)
-        travel = np.zeros_like(v)
-        travel[moving] = 0.5 * self.durations(q[moving], v[moving])[:, np.newaxis] * v[moving]
-        return travel
 
     def _growth(self, angles: Array, v: Array, duration: Array) -> Array:
         """Return the factors by which the durations (N,) must grow, one where torques hold."""

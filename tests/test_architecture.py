@@ -38,7 +38,7 @@ LAYERS = (
     ("robot_models",),
     ("cut_subtrees", "joint_selection"),
     ("joint_limits", "arm"),
-    ("rigid_body", "straight_brake"),
+    ("holding_torque", "rigid_body", "straight_brake"),
     ("distance_view", "clearance"),
     ("link_placements", "separation"),
     ("moving_hulls",),

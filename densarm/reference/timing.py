@@ -1,5 +1,7 @@
 """Time-optimal timing of a path under velocity, acceleration and torque limits, by TOPP-RA."""
 
+from typing import Any, NamedTuple
+
 import numpy as np
 import pinocchio as pin
 import toppra
@@ -8,24 +10,36 @@ import toppra.constraint
 
 from densarm.arm import Arm
 from densarm.arrays import Array
+from densarm.holding_torque import holding_ratios, holding_torque
 from densarm.reference.infeasible_timing import InfeasibleTimingError
 from densarm.reference.reference import Reference
 from densarm.reference.smooth_path import SmoothPath
 from densarm.reference.timing_parameters import TimingParameters
+from densarm.stopping_check import StoppingCheck
 
 _UNLIMITED = 1e4  # stands for an infinite limit, which TOPP-RA's solver does not take
 _GRID_STEP = 0.01  # [rad] between grid points
 _GRID = (100, 1000)
 _GRID_SHARE = 0.98  # of the limits at grid points; the rest is for what lies between them
 _SLOWDOWNS = 1.02 ** np.arange(50)  # tried in turn until the limits hold at every sample
+_ROUNDS = 12  # of slowing down where stopping is not proved
+_HALVINGS = 5  # of the range that the largest speed to stop from is in
+_CAP_SHARE = 0.98  # of that speed; the rest is for what lies between grid points
 
 toppra.setup_logging("CRITICAL")
 
 
 def time_path(
-    arm: Arm, path: SmoothPath, length: float, period: float, parameters: TimingParameters
+    arm: Arm,
+    path: SmoothPath,
+    length: float,
+    period: float,
+    parameters: TimingParameters,
+    stopping: StoppingCheck | None = None,
 ) -> Reference:
     """Return the fastest reference along a path, from rest to rest.
+
+    Where a straight brake is not proved clear, the path is slowed down until it is, there alone.
 
     Args:
         arm: its limits and dynamics.
@@ -33,37 +47,97 @@ def time_path(
         length: of the path [rad], which sets the grid.
         period: time between the reference's samples [s].
         parameters: shares of the limits.
+        stopping: proves the brakes from all samples; None to do without.
 
     Raises:
-        InfeasibleTimingError: no speed meets the limits somewhere on the path.
+        InfeasibleTimingError: no speed meets the limits somewhere on the path, or none was found
+            that the arm could stop from.
 
     Source: Pham and Pham, A New Approach to Time-Optimal Path Parameterization Based on
         Reachability Analysis, IEEE T-RO 2018.
     """
-    count = int(np.clip(length / _GRID_STEP, *_GRID))
-    instance = toppra.algorithm.TOPPRA(
-        _constraints(arm, parameters),
-        _ToppraPath(path, arm.nv),
-        gridpoints=np.linspace(0.0, 1.0, count + 1),
-        parametrizer="ParametrizeConstAccel",
-    )
-    timed = instance.compute_trajectory(0.0, 0.0)
-    for slowdown in _SLOWDOWNS if timed is not None else ():
-        reference = _sampled(timed, slowdown * timed.duration, period)
-        if _is_within_limits(arm, reference, parameters):
-            return reference
+    grid = np.linspace(0.0, 1.0, int(np.clip(length / _GRID_STEP, *_GRID)) + 1)
+    toppra_path = _ToppraPath(path, arm.nv)
+    limits = [_Computed(limit, toppra_path, grid) for limit in _constraints(arm, parameters)]
+    cap = np.full(len(grid), _UNLIMITED)
+    for _ in range(_ROUNDS):
+        fastest = toppra.algorithm.TOPPRA([*limits, _SpeedCap(arm.nv, cap)], toppra_path, grid)
+        _, speed, _ = fastest.compute_parameterization(0.0, 0.0)
+        if speed is None or not np.isfinite(speed).all():
+            break
+        timing = _timing_within_limits(arm, path, grid, speed, period, parameters)
+        if timing is None:
+            break
+        if stopping is None or not _lower(cap, stopping, arm, grid, timing):
+            return timing.reference
+    else:
+        raise InfeasibleTimingError(
+            f"arm {arm.name!r}: no speed was found from which it could stop in free space"
+        )
+    heaviest = _heaviest(arm, arm.configurations(path(grid)))
     raise InfeasibleTimingError(
-        f"arm {arm.name!r}: its torque limits allow no motion along the planned path"
+        f"arm {arm.name!r}: its torque limits allow no motion along the planned path, of which "
+        f"planning uses {parameters.torque_share:.0%}; {holding_torque(arm, heaviest)}"
     )
 
 
-def _sampled(timed: toppra.ParametrizeConstAccel, duration: float, period: float) -> Reference:
-    """Sample a timing, stretched to a whole number of periods not below the duration."""
-    count = max(1, int(np.ceil(duration / period)))
-    at = np.linspace(0.0, timed.duration, count + 1)
-    velocity = timed(at, 1) * timed.duration / (count * period)
-    velocity[[0, -1]] = 0.0
-    return Reference(period, timed(at, 0), velocity)
+class _Timing(NamedTuple):
+    """A reference and where on the path its samples are."""
+
+    reference: Reference
+    s: Array
+    """Path positions of the samples (N,)."""
+    speed: Array
+    """Path speeds of the samples (N,) [1/s]."""
+
+
+def _timing_within_limits(
+    arm: Arm,
+    path: SmoothPath,
+    grid: Array,
+    speed: Array,
+    period: float,
+    parameters: TimingParameters,
+) -> _Timing | None:
+    for slowdown in _SLOWDOWNS:
+        timing = _sampled(path, grid, speed / slowdown, period)
+        if _is_within_limits(arm, timing.reference, parameters):
+            return timing
+    return None
+
+
+def _sampled(path: SmoothPath, grid: Array, speed: Array, period: float) -> _Timing:
+    """Sample a timing, stretched to a whole number of periods; ṡ² is linear on each interval."""
+    time = np.append(0.0, np.cumsum(2.0 * np.diff(grid) / (speed[:-1] + speed[1:])))
+    count = max(1, int(np.ceil(time[-1] / period)))
+    stretch = count * period / time[-1]
+    at = np.linspace(0.0, time[-1], count + 1)
+    k = np.clip(np.searchsorted(time, at, side="right") - 1, 0, len(grid) - 2)
+    elapsed = at - time[k]
+    acceleration = np.diff(speed**2)[k] / (2.0 * np.diff(grid)[k])
+    s = np.clip(grid[k] + elapsed * (speed[k] + 0.5 * acceleration * elapsed), 0.0, 1.0)
+    s_rate = np.maximum(speed[k] + acceleration * elapsed, 0.0) / stretch
+    s[-1], s_rate[[0, -1]] = 1.0, 0.0
+    reference = Reference(period, path(s), path(s, 1) * s_rate[:, np.newaxis])
+    return _Timing(reference, s, s_rate)
+
+
+def _lower(cap: Array, stopping: StoppingCheck, arm: Arm, grid: Array, timing: _Timing) -> bool:
+    """Lower the caps on path speed where stopping is not proved; return whether there is such."""
+    q, v = arm.configurations(timing.reference.position), timing.reference.velocity
+    failing = stopping.check(q, v).failing
+    cell = np.clip(np.searchsorted(grid, timing.s[failing], side="right") - 1, 0, len(grid) - 2)
+    cell, first = np.unique(cell, return_index=True)
+    failing = failing[first]
+    low, high = np.zeros(len(failing)), np.ones(len(failing))
+    for _ in range(_HALVINGS if failing.size else 0):
+        middle = 0.5 * (low + high)
+        result = stopping.check(q[failing], middle[:, np.newaxis] * v[failing])
+        low, high = np.where(result.holds, middle, low), np.where(result.holds, high, middle)
+    allowed = _CAP_SHARE * np.maximum(low, 0.5 * high) * timing.speed[failing]
+    np.minimum.at(cap, cell, allowed)
+    np.minimum.at(cap, cell + 1, allowed)
+    return bool(failing.size)
 
 
 def _is_within_limits(arm: Arm, reference: Reference, parameters: TimingParameters) -> bool:
@@ -103,6 +177,11 @@ def _constraints(arm: Arm, parameters: TimingParameters) -> list[toppra.constrai
     ]
 
 
+def _heaviest(arm: Arm, q: Array) -> Array:
+    """Return the configuration, of (N, nq), whose holding torque is nearest to its limits."""
+    return max(q, key=lambda row: float(holding_ratios(arm, row).max()))
+
+
 def _both_sides(limit: Array) -> Array:
     bounded = np.minimum(_GRID_SHARE * limit, _UNLIMITED)
     return np.column_stack([-bounded, bounded])
@@ -125,3 +204,30 @@ class _ToppraPath(toppra.interpolator.AbstractGeometricPath):
     @property
     def path_interval(self) -> Array:
         return np.array([0.0, 1.0])
+
+
+class _Computed(toppra.constraint.LinearConstraint):
+    """A constraint whose coefficients are computed once for several timings."""
+
+    def __init__(
+        self, inner: toppra.constraint.LinearConstraint, path: _ToppraPath, grid: Array
+    ) -> None:
+        super().__init__()
+        self.dof = inner.dof
+        self.identical = inner.identical
+        self._found = inner.compute_constraint_params(path, grid)
+
+    def compute_constraint_params(self, *_: object) -> Any:
+        return self._found
+
+
+class _SpeedCap(toppra.constraint.LinearConstraint):
+    """Upper bounds on the path speed at grid points."""
+
+    def __init__(self, dof: int, cap: Array) -> None:
+        super().__init__()
+        self.dof = dof
+        self._bounds = np.column_stack([np.zeros_like(cap), cap**2])
+
+    def compute_constraint_params(self, *_: object) -> Any:
+        return (*[None] * 6, self._bounds)
