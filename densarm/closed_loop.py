@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from densarm.arm import Arm
 from densarm.arrays import Array
 from densarm.clearance import Clearance
 from densarm.control.controller import Controller
@@ -14,10 +15,12 @@ from densarm.control.density_feedback import DensityFeedback
 from densarm.control.density_tracking import DensityTracking
 from densarm.control.field_regulation import FieldRegulation
 from densarm.control.field_velocity import FieldVelocity
+from densarm.control.stoppable_controller import StoppableController
 from densarm.control.velocity_controller import VelocityController
 from densarm.fields.density_field import DensityField
 from densarm.fields.speed_law import SpeedLaw
 from densarm.guides.guide import Guide, NoPath
+from densarm.holding_torque import holding_ratios, holding_torque
 from densarm.motion_plan import MotionPlan, plan_motion
 from densarm.outcome import Outcome
 from densarm.reference.infeasible_timing import InfeasibleTimingError
@@ -115,14 +118,20 @@ def run_closed_loop(
     return _run(scenario, clearance, drive, plan_time, on_progress)
 
 
-def make_controller(scenario: Scenario, plan: MotionPlan) -> Controller:
+def make_controller(scenario: Scenario, plan: MotionPlan) -> StoppableController:
     """Return the controller that a scenario names.
 
     Args:
         scenario: form, gains and speed law.
         plan: the way that it drives the arm along.
     """
-    arm, period = scenario.arm, scenario.simulation.control_period
+    period = scenario.simulation.control_period
+    controller = _controller(scenario, plan, period)
+    return StoppableController(scenario.arm, controller, scenario.gains, period)
+
+
+def _controller(scenario: Scenario, plan: MotionPlan, period: float) -> Controller:
+    arm = scenario.arm
     if plan.reference is not None:
         density = reference_density(
             plan.bound, plan.reference, scenario.sensing, scenario.density, scenario.control.kappa
@@ -224,7 +233,11 @@ def _fault(scenario: Scenario, clearance: Clearance) -> str:
     return "; ".join(
         f"{name}: {fault}"
         for name, q in ends.items()
-        for fault in [*_limit_faults(scenario, q), *_contact_faults(scenario, clearance, q)]
+        for fault in [
+            *_limit_faults(scenario, q),
+            *_holding_faults(scenario.arm, q),
+            *_contact_faults(scenario, clearance, q),
+        ]
     )
 
 
@@ -234,6 +247,11 @@ def _limit_faults(scenario: Scenario, q: Array) -> Iterator[str]:
     for j in np.flatnonzero((angles < limits.lower) | (angles > limits.upper)):
         allowed = f"[{limits.lower[j]:.4g}, {limits.upper[j]:.4g}]"
         yield f"joint {names[j]!r} at {angles[j]:.4g} is outside {allowed}"
+
+
+def _holding_faults(arm: Arm, q: Array) -> Iterator[str]:
+    if holding_ratios(arm, q).max() > 1.0:
+        yield holding_torque(arm, q)
 
 
 def _contact_faults(scenario: Scenario, clearance: Clearance, q: Array) -> Iterator[str]:

@@ -6,6 +6,9 @@ import pinocchio as pin
 from densarm.arm import Arm
 from densarm.arrays import Array
 
+HELD_SHARE = 0.97
+"""Share of the acceleration limits that is asked for: a torque is held while the state changes."""
+
 _SHARES = np.linspace(0.0, 1.0, 5)  # of the brake's time, at which torques are computed
 _GROWTH = 1.01  # of T at least, where torques exceed their limits
 _LARGEST_GROWTH = 2.0
@@ -31,7 +34,7 @@ class StraightBrake:
     """
 
     def __init__(
-        self, arm: Arm, acceleration_share: float = 1.0, torque_share: float = 1.0
+        self, arm: Arm, acceleration_share: float = HELD_SHARE, torque_share: float = 1.0
     ) -> None:
         self._arm = arm
         self._acceleration = acceleration_share * arm.limits.acceleration

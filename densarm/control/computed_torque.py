@@ -1,6 +1,5 @@
 """ComputedTorque: the classical tracking controller, which knows of no obstacle."""
 
-import numpy as np
 from numpy.typing import ArrayLike
 
 from densarm.arm import Arm
@@ -10,6 +9,7 @@ from densarm.control.gains import Gains
 from densarm.control.inverse_dynamics import InverseDynamics
 from densarm.density.goal_distance import TorusDistance
 from densarm.reference.reference import Reference
+from densarm.straight_brake import HELD_SHARE
 
 
 class ComputedTorque:
@@ -33,7 +33,7 @@ class ComputedTorque:
         self._arm = arm
         self._reference = reference
         self._gains = gains
-        self._dynamics = InverseDynamics(arm, np.full(arm.nv, np.inf))
+        self._dynamics = InverseDynamics(arm, HELD_SHARE * arm.limits.acceleration)
         self._wanted = TorusDistance(arm, arm.configuration(reference.position[0]))
 
     def torque(self, t: float, q: ArrayLike, v: ArrayLike) -> Array:

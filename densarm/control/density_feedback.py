@@ -1,6 +1,5 @@
 """DensityFeedback: the plain law u = ∇ρ + d(q, q̇)."""
 
-import numpy as np
 from numpy.typing import ArrayLike
 
 from densarm.arm import Arm
@@ -8,7 +7,9 @@ from densarm.arrays import Array
 from densarm.control.controller import checked_state
 from densarm.control.gains import Gains
 from densarm.control.inverse_dynamics import InverseDynamics
+from densarm.control.stopping_guard import StoppingGuard
 from densarm.fields.density_field import DensityField
+from densarm.straight_brake import HELD_SHARE
 
 
 class DensityFeedback:
@@ -37,8 +38,8 @@ class DensityFeedback:
         self._arm = arm
         self._field = field
         self._gain = gains.velocity
-        self._period = period
-        self._dynamics = InverseDynamics(arm, arm.limits.acceleration)
+        self._dynamics = InverseDynamics(arm, HELD_SHARE * arm.limits.acceleration)
+        self._guard = StoppingGuard(arm, field.speed_law, period)
         self._metric = 1.0 / arm.mass_matrix(field.guided.chain.q[-1]).diagonal().max()
 
     def torque(self, t: float, q: ArrayLike, v: ArrayLike) -> Array:
@@ -47,7 +48,5 @@ class DensityFeedback:
         self._dynamics.update(q, v)
         metric = self._metric * self._dynamics.mass_matrix()
         attract = self._gain * self._field.update(q, metric)
-        distance = self._field.guided.clearance.distance
-        if self._field.speed_law.must_brake(v, distance, 2.0 * self._period):
-            return self._dynamics.torque(-v / self._period, np.zeros_like(v))
-        return self._dynamics.torque(-self._gain * v, attract)
+        wanted = self._dynamics.torque(-self._gain * v, attract)
+        return self._guard.torque(self._dynamics, q, v, wanted, self._field.clearance.distance)

@@ -11,6 +11,7 @@ from densarm.control.gains import Gains
 from densarm.control.inverse_dynamics import InverseDynamics
 from densarm.density import NavigationDensity, TorusDistance
 from densarm.reference.reference import Reference
+from densarm.straight_brake import HELD_SHARE
 
 
 class DensityTracking:
@@ -44,8 +45,7 @@ class DensityTracking:
         self._density = density
         self._reference = reference
         self._gains = gains
-        # The reference keeps the acceleration limits; feedback on top of it may need more.
-        self._dynamics = InverseDynamics(arm, np.full(arm.nv, np.inf))
+        self._dynamics = InverseDynamics(arm, HELD_SHARE * arm.limits.acceleration)
         self._gauge = density.parameters.gauge
         self._brake, self._attract = np.zeros(arm.nv), np.zeros(arm.nv)
 

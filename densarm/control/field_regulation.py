@@ -1,6 +1,5 @@
 """FieldRegulation: the inverse-dynamics controller that follows a planning system."""
 
-import numpy as np
 from numpy.typing import ArrayLike
 
 from densarm.arm import Arm
@@ -8,7 +7,9 @@ from densarm.arrays import Array
 from densarm.control.controller import checked_state
 from densarm.control.gains import Gains
 from densarm.control.inverse_dynamics import InverseDynamics
+from densarm.control.stopping_guard import StoppingGuard
 from densarm.fields.velocity_field import VelocityField
+from densarm.straight_brake import HELD_SHARE
 
 
 class FieldRegulation:
@@ -17,8 +18,8 @@ class FieldRegulation:
     .. math:: \tau = H + M K_v (k(q) - \dot q)
 
     With the field of the density, k = (K_p/K_v) ∇ρ at the speed of the speed law, this is [ZNV]
-    eq. 17 with a constant q_d, its attraction scaled before its damping. Where the full brake
-    would leave the free space ahead, the arm brakes in a straight line.
+    eq. 17 with a constant q_d, its attraction scaled before its damping. Where the arm could no
+    longer stop in the free space ahead, it brakes in a straight line.
 
     Args:
         arm: the arm.
@@ -33,15 +34,13 @@ class FieldRegulation:
         self._arm = arm
         self._field = field
         self._gain = gains.velocity
-        self._period = period
-        self._dynamics = InverseDynamics(arm, arm.limits.acceleration)
+        self._dynamics = InverseDynamics(arm, HELD_SHARE * arm.limits.acceleration)
+        self._guard = StoppingGuard(arm, field.speed_law, period)
 
     def torque(self, t: float, q: ArrayLike, v: ArrayLike) -> Array:
         """Act as `Controller.torque`."""
         q, v = checked_state(self._arm, q, v)
         attract = self._gain * self._field.update(q)
         self._dynamics.update(q, v)
-        distance = self._field.clearance.distance
-        if self._field.speed_law.must_brake(v, distance, 2.0 * self._period):
-            return self._dynamics.torque(-v / self._period, np.zeros_like(v))
-        return self._dynamics.torque(-self._gain * v, attract)
+        wanted = self._dynamics.torque(-self._gain * v, attract)
+        return self._guard.torque(self._dynamics, q, v, wanted, self._field.clearance.distance)

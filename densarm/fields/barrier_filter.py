@@ -94,7 +94,7 @@ class BarrierFilter:
             return np.zeros_like(self._slope)
         velocity = self._filter(self._nominal(), value / steepness, self._slope / steepness)
         way_left = float(np.linalg.norm(self.goal_distance.error(q)))
-        return self.speed_law.limit(velocity, self.clearance.distance, way_left)
+        return self.speed_law.limit(q, velocity, self.clearance.distance, way_left)
 
     def _nominal(self) -> Array:
         velocity = -self._rate * self._slope

@@ -52,4 +52,4 @@ class DensityField:
         velocity = self._rate * self._gradient
         if metric is not None:
             velocity = np.asarray(np.linalg.solve(metric, velocity), dtype=np.float64)
-        return self.speed_law.limit(velocity, self.clearance.distance, guided.way_left(q))
+        return self.speed_law.limit(q, velocity, self.clearance.distance, guided.way_left(q))

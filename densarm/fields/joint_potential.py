@@ -58,4 +58,4 @@ class PotentialAscent:
         """Act as `VelocityField.update`."""
         velocity = self._rate * self.potential.direction(q)
         way_left = float(np.linalg.norm(self.potential.goal_distance.error(q)))
-        return self.speed_law.limit(velocity, self.clearance.distance, way_left)
+        return self.speed_law.limit(q, velocity, self.clearance.distance, way_left)

@@ -8,7 +8,10 @@ import numpy as np
 from densarm.arrays import Array
 from densarm.compiled import compiled
 from densarm.errors import InvalidValueError
+from densarm.straight_brake import StraightBrake
 from densarm.swept_bound import SweptBound
+
+_HALVINGS = 6  # of a speed from which no brake is within the limits
 
 
 @dataclass(frozen=True)
@@ -20,7 +23,7 @@ class SpeedParameters:
     """
 
     braking_share: float = 0.3
-    """Share of the acceleration limits that planned braking uses."""
+    """Share that planned braking uses of the deceleration that the limits leave."""
     velocity_share: float = 1.0
     """Share of the velocity limits."""
 
@@ -36,11 +39,11 @@ class SpeedLaw:
     .. math::
 
         s = \min\Big\{ \frac{\nu v_i^{max}}{|u_i|},\ \sqrt{2 \beta a \ell},\
-        \sqrt{2 \beta a h_k / r_k} \Big\}, \qquad
-        a = \min_i \frac{a_i^{max}}{|u_i|}, \quad r_k = \sum_j r_{kj} |u_j|
+        \sqrt{2 \beta a h_k / r_k} \Big\}, \qquad r_k = \sum_j r_{kj} |u_j|
 
-    The straight-line brake at β of the acceleration limits then ends before the goal and before a
-    pair's clearance h_k can be used up: ℓ is the length of the way left, r_kj the swept bound.
+    The straight brake at β of the deceleration a then ends before the goal and before a pair's
+    clearance h_k can be used up: ℓ is the length of the way left, r_kj the swept bound. a is what
+    the acceleration limits and the dynamics on the way of the brake leave.
 
     Args:
         bound: the swept bound, whose margin is kept.
@@ -48,37 +51,43 @@ class SpeedLaw:
     """
 
     def __init__(self, bound: SweptBound, parameters: SpeedParameters) -> None:
-        self._limits = bound.arm.limits
+        self._arm = bound.arm
         self._velocity_limit = parameters.velocity_share * bound.arm.limits.velocity
         self._lever = bound.lever
         self._margin = bound.margin
         self._parameters = parameters
+        self._brake = StraightBrake(bound.arm)
 
-    def speed(self, direction: Array, distance: Array, way_left: float) -> float:
-        """Return the speed s [rad/s].
+    def speed(self, q: Array, direction: Array, distance: Array, way_left: float) -> float:
+        """Return the speed s [rad/s]; zero where no brake is within the limits.
 
         Args:
+            q: configuration (nq,).
             direction: unit vector u (nv,).
             distance: signed distances of all pairs (K,) [m].
             way_left: length ℓ of the way to the goal [rad].
         """
-        return float(
-            _speed(
-                direction,
-                distance,
-                self._margin,
-                self._lever,
-                self._velocity_limit,
-                self._limits.acceleration,
-                way_left,
-                self._parameters.braking_share,
-            )
+        limits = self._arm.limits
+        fastest, room = _fastest(
+            direction, distance, self._margin, self._lever, self._velocity_limit, way_left
         )
+        deceleration = 1.0 / float((np.abs(direction) / limits.acceleration).max())
+        share = self._parameters.braking_share
+        speed = min(fastest, math.sqrt(2.0 * share * deceleration * room))
+        if not 0.0 < speed < np.inf:
+            return speed
+        for _ in range(_HALVINGS):
+            duration = self._brake.duration(q, speed * direction)
+            if math.isfinite(duration):
+                break
+            speed *= 0.5
+        return min(speed, math.sqrt(2.0 * share * (speed / duration) * room))
 
-    def limit(self, velocity: Array, distance: Array, way_left: float) -> Array:
+    def limit(self, q: Array, velocity: Array, distance: Array, way_left: float) -> Array:
         """Return a velocity (nv,), shortened to the speed s along it where it is faster.
 
         Args:
+            q: configuration (nq,).
             velocity: shape (nv,) [rad/s or m/s].
             distance: signed distances of all pairs (K,) [m].
             way_left: length ℓ of the way to the goal [rad].
@@ -86,65 +95,44 @@ class SpeedLaw:
         norm = float(np.sqrt(velocity @ velocity))
         if norm == 0.0:
             return velocity
-        return velocity * min(1.0, self.speed(velocity / norm, distance, way_left) / norm)
+        return velocity * min(1.0, self.speed(q, velocity / norm, distance, way_left) / norm)
 
-    def must_brake(self, v: Array, distance: Array, reaction: float) -> bool:
-        """Return whether the full straight-line brake from v would leave the proved free space.
+    def can_stop(self, q: Array, v: Array, distance: Array, motion: Array) -> bool:
+        """Return whether the straight brake is proved to end in free space, inside all limits.
 
         Args:
-            v: velocity (nv,).
-            distance: signed distances of all pairs (K,) [m].
-            reaction: time before the brake acts [s].
+            q: configuration (nq,).
+            v: velocity (nv,) [rad/s or m/s].
+            distance: signed distances of all pairs (K,) [m], known before the arm came to q.
+            motion: bound on the motion of each joint since then (nv,) [rad or m].
         """
-        return _must_brake(
-            v, distance, self._margin, self._lever, self._limits.acceleration, reaction
-        )
+        duration = self._brake.duration(q, v)
+        if not math.isfinite(duration):
+            return False
+        end, limits = self._arm.angles(q) + 0.5 * duration * v, self._arm.limits
+        outward = ((end > limits.upper) & (v > 0.0)) | ((end < limits.lower) & (v < 0.0))
+        used = self._lever @ (motion + 0.5 * duration * np.abs(v))
+        return not outward.any() and bool(((used < distance - self._margin) | (used == 0.0)).all())
 
 
 @compiled
-def _speed(
+def _fastest(
     direction: Array,
     distance: Array,
     margin: float,
     lever: Array,
     velocity_limit: Array,
-    acceleration_limit: Array,
     way_left: float,
-    braking_share: float,
-) -> float:
-    speed, braking = np.inf, np.inf
+) -> tuple[float, float]:
+    """Return the speed that the velocity limits allow, and the room along the direction [rad]."""
+    speed, room = np.inf, way_left
     for j in range(direction.shape[0]):
-        part = abs(direction[j])
-        if part > 0.0:
-            speed = min(speed, velocity_limit[j] / part)
-            braking = min(braking, braking_share * acceleration_limit[j] / part)
-    room = way_left
+        if direction[j] != 0.0:
+            speed = min(speed, velocity_limit[j] / abs(direction[j]))
     for k in range(distance.shape[0]):
         rate = 0.0
         for j in range(direction.shape[0]):
             rate += lever[k, j] * abs(direction[j])
         if rate > 0.0:
             room = min(room, max(distance[k] - margin, 0.0) / rate)
-    return min(speed, math.sqrt(2.0 * braking * room))
-
-
-@compiled
-def _must_brake(
-    v: Array,
-    distance: Array,
-    margin: float,
-    lever: Array,
-    acceleration_limit: Array,
-    reaction: float,
-) -> bool:
-    time = 0.0
-    for j in range(v.shape[0]):
-        time = max(time, abs(v[j]) / acceleration_limit[j])
-    path_time = 0.5 * time + reaction
-    for k in range(distance.shape[0]):
-        rate = 0.0
-        for j in range(v.shape[0]):
-            rate += lever[k, j] * abs(v[j])
-        if rate * path_time > 0.0 and rate * path_time >= distance[k] - margin:
-            return True
-    return False
+    return speed, room

@@ -7,6 +7,7 @@ import pinocchio as pin
 import toppra
 import toppra.algorithm
 import toppra.constraint
+from numpy.typing import NDArray
 
 from densarm.arm import Arm
 from densarm.arrays import Array
@@ -23,7 +24,7 @@ _GRID = (100, 1000)
 _GRID_SHARE = 0.98  # of the limits at grid points; the rest is for what lies between them
 _SLOWDOWNS = 1.02 ** np.arange(50)  # tried in turn until the limits hold at every sample
 _ROUNDS = 12  # of slowing down where stopping is not proved
-_HALVINGS = 5  # of the range that the largest speed to stop from is in
+_HALVINGS = 7  # of the range that the largest speed to stop from is in
 _CAP_SHARE = 0.98  # of that speed; the rest is for what lies between grid points
 
 toppra.setup_logging("CRITICAL")
@@ -68,12 +69,12 @@ def time_path(
         timing = _timing_within_limits(arm, path, grid, speed, period, parameters)
         if timing is None:
             break
-        if stopping is None or not _lower(cap, stopping, arm, grid, timing):
+        failing = _failing(stopping, arm, timing)
+        if stopping is None or not failing.size:
             return timing.reference
+        _lower(cap, stopping, arm, grid, timing, failing)
     else:
-        raise InfeasibleTimingError(
-            f"arm {arm.name!r}: no speed was found from which it could stop in free space"
-        )
+        raise _unstoppable(arm, timing.reference.position[failing[0]])
     heaviest = _heaviest(arm, arm.configurations(path(grid)))
     raise InfeasibleTimingError(
         f"arm {arm.name!r}: its torque limits allow no motion along the planned path, of which "
@@ -122,22 +123,38 @@ def _sampled(path: SmoothPath, grid: Array, speed: Array, period: float) -> _Tim
     return _Timing(reference, s, s_rate)
 
 
-def _lower(cap: Array, stopping: StoppingCheck, arm: Arm, grid: Array, timing: _Timing) -> bool:
-    """Lower the caps on path speed where stopping is not proved; return whether there is such."""
-    q, v = arm.configurations(timing.reference.position), timing.reference.velocity
-    failing = stopping.check(q, v).failing
+def _failing(stopping: StoppingCheck | None, arm: Arm, timing: _Timing) -> NDArray[np.int64]:
+    """Return the samples from which stopping is not proved."""
+    if stopping is None:
+        return np.zeros(0, dtype=np.int64)
+    reference = timing.reference
+    return stopping.check(arm.configurations(reference.position), reference.velocity).failing
+
+
+def _lower(
+    cap: Array,
+    stopping: StoppingCheck,
+    arm: Arm,
+    grid: Array,
+    timing: _Timing,
+    failing: NDArray[np.int64],
+) -> None:
+    """Lower the caps on path speed around failing samples to speeds that the arm can stop from."""
     cell = np.clip(np.searchsorted(grid, timing.s[failing], side="right") - 1, 0, len(grid) - 2)
     cell, first = np.unique(cell, return_index=True)
     failing = failing[first]
+    q = arm.configurations(timing.reference.position[failing])
+    v = timing.reference.velocity[failing]
     low, high = np.zeros(len(failing)), np.ones(len(failing))
-    for _ in range(_HALVINGS if failing.size else 0):
+    for _ in range(_HALVINGS):
         middle = 0.5 * (low + high)
-        result = stopping.check(q[failing], middle[:, np.newaxis] * v[failing])
-        low, high = np.where(result.holds, middle, low), np.where(result.holds, high, middle)
-    allowed = _CAP_SHARE * np.maximum(low, 0.5 * high) * timing.speed[failing]
+        holds = stopping.check(q, middle[:, np.newaxis] * v).holds
+        low, high = np.where(holds, middle, low), np.where(holds, high, middle)
+    if (low == 0.0).any():
+        raise _unstoppable(arm, timing.reference.position[failing[low.argmin()]])
+    allowed = _CAP_SHARE * low * timing.speed[failing]
     np.minimum.at(cap, cell, allowed)
     np.minimum.at(cap, cell + 1, allowed)
-    return bool(failing.size)
 
 
 def _is_within_limits(arm: Arm, reference: Reference, parameters: TimingParameters) -> bool:
@@ -175,6 +192,14 @@ def _constraints(arm: Arm, parameters: TimingParameters) -> list[toppra.constrai
             torque, _both_sides(limits.effort * parameters.torque_share), np.zeros(arm.nv)
         ),
     ]
+
+
+def _unstoppable(arm: Arm, angles: Array) -> InfeasibleTimingError:
+    where = ", ".join(f"{angle:.4g}" for angle in angles)
+    return InfeasibleTimingError(
+        f"arm {arm.name!r}: no speed was found from which it could stop in free space at joint "
+        f"positions ({where}) of the planned path"
+    )
 
 
 def _heaviest(arm: Arm, q: Array) -> Array:
