@@ -71,10 +71,11 @@ class StoppingCheck:
         duration = self._brake.durations(q, v)
         travel = 0.5 * np.where(np.isfinite(duration), duration, 0.0)[:, np.newaxis] * v
         end = arm.angles(q) + travel
-        inside = (end >= limits.lower - _ROUNDING) & (end <= limits.upper + _ROUNDING)
+        outside = np.maximum(limits.lower - end, end - limits.upper).max(axis=1)
+        inside = np.asarray(outside <= _ROUNDING)
         turns = np.cumsum(arm.difference(q[:-1], q[1:]), axis=0)
         angles = arm.angles(q[0]) + np.vstack([np.zeros(arm.nv), turns])
-        return StoppingResult(duration, end, inside.all(axis=1), self._clear(angles, travel))
+        return StoppingResult(duration, end, inside, self._clear(angles, travel))
 
     def _clear(self, angles: Array, travel: Array) -> NDArray[np.bool_]:
         n, end = len(angles), angles + travel

@@ -6,10 +6,11 @@ import pinocchio as pin
 from densarm.arm import Arm
 from densarm.arrays import Array
 
-HELD_SHARE = 0.97
+HELD_SHARE = 0.95
 """Share of the acceleration limits that is asked for: a torque is held while the state changes."""
 
-_SHARES = np.linspace(0.0, 1.0, 5)  # of the brake's time, at which torques are computed
+_SHARES = np.array([0.0, 0.25, 0.5, 0.75, 1.0, 1.0])  # of T, at which torques are computed
+_BRAKES = np.array([1.0, 1.0, 1.0, 1.0, 1.0, 0.0])  # or, at last, holds
 _GROWTH = 1.01  # of T at least, where torques exceed their limits
 _LARGEST_GROWTH = 2.0
 _ROUNDS = 40
@@ -24,8 +25,8 @@ class StraightBrake:
         \dot q(t) = (1 - t/T)\, v, \qquad q(t) = q \oplus (t - t^2/2T)\, v, \qquad
         \tau(t) = H(q(t), \dot q(t)) - M(q(t))\, v / T
 
-    T is the shortest found for which accelerations, and torques at five instants of the brake,
-    are within the limits. The arm comes to rest at q ⊕ T v / 2.
+    T is the shortest found for which accelerations are within the limits, and torques at five
+    instants of the brake and at rest after it. The arm comes to rest at q ⊕ T v / 2.
 
     Args:
         arm: its dynamics and limits.
@@ -53,8 +54,8 @@ class StraightBrake:
             v: velocities (N, nv) [rad/s or m/s].
         """
         angles = self._arm.angles(q)
-        duration = (np.abs(v) / self._acceleration).max(axis=1)
-        longer = np.flatnonzero(duration > 0.0)
+        duration: Array = (np.abs(v) / self._acceleration).max(axis=1)
+        longer = np.flatnonzero((duration > 0.0) & np.isfinite(duration))
         for _ in range(_ROUNDS):
             growth = self._growth(angles[longer], v[longer], duration[longer])
             longer, growth = longer[growth > 1.0], growth[growth > 1.0]
@@ -70,7 +71,7 @@ class StraightBrake:
         theta = angles[:, np.newaxis] + time[..., np.newaxis] * v[:, np.newaxis]
         q = self._arm.configurations(theta)
         speed = (1.0 - _SHARES)[:, np.newaxis] * v[:, np.newaxis]
-        brake = np.broadcast_to((-v / duration[:, np.newaxis])[:, np.newaxis], speed.shape)
+        brake = -_BRAKES[:, np.newaxis] * (v / duration[:, np.newaxis])[:, np.newaxis]
         torque = self._torque(q, speed, brake)
         growth = np.ones(len(v))
         weak = ~(np.abs(torque) <= self._effort).all(axis=(1, 2))
@@ -89,11 +90,14 @@ class StraightBrake:
         """
         bound = np.where(brake > 0.0, self._effort, -self._effort) - held
         with np.errstate(divide="ignore", invalid="ignore"):
-            share = np.where(brake != 0.0, bound / brake, np.inf).min(axis=(1, 2))
+            free = np.where(np.abs(held) <= self._effort, np.inf, 0.0)
+            share = np.where(brake != 0.0, bound / brake, free).min(axis=(1, 2))
             needed = np.where(share > 0.0, 1.0 / share, _LARGEST_GROWTH)
-        return np.clip(np.nan_to_num(needed, nan=_LARGEST_GROWTH), _GROWTH, _LARGEST_GROWTH)
+        needed = np.nan_to_num(needed, nan=_LARGEST_GROWTH)
+        return np.asarray(np.clip(needed, _GROWTH, _LARGEST_GROWTH))
 
     def _torque(self, q: Array, v: Array, a: Array) -> Array:
         """Return the torque (N, M, nv) of states and accelerations, each (N, M, ...)."""
         columns = [np.asfortranarray(x.reshape(-1, x.shape[-1]).T) for x in (q, v, a)]
+        # Pinocchio drops the axis of a single joint.
         return np.asarray(pin.rneaInParallel(1, self._pool, *columns)).T.reshape(v.shape)

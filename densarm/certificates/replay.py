@@ -47,8 +47,9 @@ class _Accelerations:
 
     def __call__(self, angles: Array, v: Array) -> Array:
         q = np.asfortranarray(self._arm.configurations(angles).T)
-        v = np.asfortranarray(v.T)
-        return np.asarray(pin.abaInParallel(1, self._pool, q, v, self._tau)).T
+        columns = pin.abaInParallel(1, self._pool, q, np.asfortranarray(v.T), self._tau)
+        # Pinocchio drops the axis of a single joint, and of a single state.
+        return np.asarray(columns).T.reshape(v.shape)
 
 
 def _semi_implicit_euler(

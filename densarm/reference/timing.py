@@ -60,26 +60,19 @@ def time_path(
     grid = np.linspace(0.0, 1.0, int(np.clip(length / _GRID_STEP, *_GRID)) + 1)
     toppra_path = _ToppraPath(path, arm.nv)
     limits = [_Computed(limit, toppra_path, grid) for limit in _constraints(arm, parameters)]
-    cap = np.full(len(grid), _UNLIMITED)
+    cap, where = np.full(len(grid), _UNLIMITED), path(0.0)
     for _ in range(_ROUNDS):
         fastest = toppra.algorithm.TOPPRA([*limits, _SpeedCap(arm.nv, cap)], toppra_path, grid)
         _, speed, _ = fastest.compute_parameterization(0.0, 0.0)
-        if speed is None or not np.isfinite(speed).all():
-            break
         timing = _timing_within_limits(arm, path, grid, speed, period, parameters)
         if timing is None:
-            break
+            raise _too_weak(arm, arm.configurations(path(grid)), parameters.torque_share)
         failing = _failing(stopping, arm, timing)
         if stopping is None or not failing.size:
             return timing.reference
+        where = timing.reference.position[failing[0]]
         _lower(cap, stopping, arm, grid, timing, failing)
-    else:
-        raise _unstoppable(arm, timing.reference.position[failing[0]])
-    heaviest = _heaviest(arm, arm.configurations(path(grid)))
-    raise InfeasibleTimingError(
-        f"arm {arm.name!r}: its torque limits allow no motion along the planned path, of which "
-        f"planning uses {parameters.torque_share:.0%}; {holding_torque(arm, heaviest)}"
-    )
+    raise _unstoppable(arm, where)
 
 
 class _Timing(NamedTuple):
@@ -96,10 +89,12 @@ def _timing_within_limits(
     arm: Arm,
     path: SmoothPath,
     grid: Array,
-    speed: Array,
+    speed: Array | None,
     period: float,
     parameters: TimingParameters,
 ) -> _Timing | None:
+    if speed is None or not np.isfinite(speed).all():
+        return None
     for slowdown in _SLOWDOWNS:
         timing = _sampled(path, grid, speed / slowdown, period)
         if _is_within_limits(arm, timing.reference, parameters):
@@ -202,9 +197,13 @@ def _unstoppable(arm: Arm, angles: Array) -> InfeasibleTimingError:
     )
 
 
-def _heaviest(arm: Arm, q: Array) -> Array:
-    """Return the configuration, of (N, nq), whose holding torque is nearest to its limits."""
-    return max(q, key=lambda row: float(holding_ratios(arm, row).max()))
+def _too_weak(arm: Arm, q: Array, torque_share: float) -> InfeasibleTimingError:
+    """Return what to say of a path through configurations (N, nq)."""
+    heaviest = max(q, key=lambda row: float(holding_ratios(arm, row).max()))
+    return InfeasibleTimingError(
+        f"arm {arm.name!r}: its torque limits allow no motion along the planned path, of which "
+        f"planning uses {torque_share:.0%}; {holding_torque(arm, heaviest)}"
+    )
 
 
 def _both_sides(limit: Array) -> Array:

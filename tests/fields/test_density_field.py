@@ -28,7 +28,7 @@ def test_direction_is_the_gradient_and_speed_within_the_law(parts, angles):
     assert k @ gradient == pytest.approx(norm * np.linalg.norm(gradient))
     if norm > 0.0:
         distance = bound.clearance.distances(q)
-        assert norm <= law.speed(k / norm, distance, guided.way_left(q)) * (1 + 1e-9)
+        assert norm <= law.speed(q, k / norm, distance, guided.way_left(q)) * (1 + 1e-9)
 
 
 def test_near_the_goal_it_is_linear(parts):

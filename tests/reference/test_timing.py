@@ -10,7 +10,9 @@ from densarm.errors import InvalidValueError
 from densarm.reference import InfeasibleTimingError, TimingParameters
 from densarm.reference.smooth_path import smooth_path
 from densarm.reference.timing import time_path
-from densarm.scene import Scene
+from densarm.scene import Scene, Sphere
+from densarm.stopping_check import StoppingCheck
+from densarm.straight_brake import StraightBrake
 from densarm.swept_bound import SweptBound
 
 PERIOD = 0.001  # [s]
@@ -65,8 +67,44 @@ def test_limits_hold_at_every_sample(timed):
 
 def test_an_arm_too_weak_to_hold_itself(timed):
     arm, path, _ = timed
-    with pytest.raises(InfeasibleTimingError, match="torque limits allow no motion"):
+    message = r"torque limits allow no motion .* joint '.*' needs .* and has "
+    with pytest.raises(InfeasibleTimingError, match=message):
         time_path(arm, path, 3.0, PERIOD, TimingParameters(torque_share=0.01))
+
+
+@pytest.fixture(scope="module")
+def bend():
+    """A path around a bend, and a ball that it misses but the brakes of a fast motion do not."""
+    arm = load_arm("two_link")
+    corners = np.stack([arm.configuration(c) for c in ([0.0, 0.0], [2.4, 0.0], [2.4, -2.4])])
+    ball = Scene([Sphere(name="ball", radius=0.1, position=[1.487, 0.0, 1.337])])
+    bound = SweptBound(Clearance(arm, ball))
+    path = smooth_path(SweptBound(Clearance(arm, Scene())), corners)
+    return arm, path, StoppingCheck(bound, StraightBrake(arm))
+
+
+def test_slows_down_where_it_could_not_stop_and_only_there(bend):
+    arm, path, stopping = bend
+    fast, safe = (
+        time_path(arm, path, 4.8, PERIOD, TimingParameters(), check) for check in (None, stopping)
+    )
+
+    def failing(reference):
+        q = arm.configurations(reference.position)
+        return stopping.check(q, reference.velocity).failing
+
+    assert failing(fast).size > 0
+    assert failing(safe).size == 0
+    assert fast.duration < safe.duration < 1.3 * fast.duration
+    np.testing.assert_allclose(safe.velocity[:300], fast.velocity[:300], atol=0.05)
+
+
+def test_no_speed_to_stop_from_where_the_path_touches(bend):
+    arm, path, _ = bend
+    tip = Scene([Sphere(name="ball", radius=0.1, position=[2.0, 0.0, 0.0])])
+    stopping = StoppingCheck(SweptBound(Clearance(arm, tip)), StraightBrake(arm))
+    with pytest.raises(InfeasibleTimingError, match=r"could stop .* at joint positions \(\d"):
+        time_path(arm, path, 4.8, PERIOD, TimingParameters(), stopping)
 
 
 @pytest.mark.parametrize("key", ["velocity_share", "acceleration_share", "torque_share"])

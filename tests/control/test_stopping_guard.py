@@ -1,0 +1,54 @@
+"""The guard: from a state that the arm can stop in, every state that follows is one too."""
+
+import numpy as np
+import pinocchio as pin
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from densarm.arm import load_arm
+from densarm.clearance import Clearance
+from densarm.control.inverse_dynamics import InverseDynamics
+from densarm.control.stopping_guard import StoppingGuard
+from densarm.fields import SpeedLaw, SpeedParameters
+from densarm.scene import Scene, Sphere
+from densarm.straight_brake import HELD_SHARE
+from densarm.swept_bound import SweptBound
+
+ARM = load_arm("two_link")
+BALLS = [
+    Sphere(name=f"ball{k}", radius=0.3, position=(1.8 * np.sin(a), 0.0, -1.8 * np.cos(a)))
+    for k, a in enumerate((1.2, -1.2, 2.6))
+]
+BOUND = SweptBound(Clearance(ARM, Scene(BALLS)))
+DT = 0.002  # [s]
+
+
+@settings(max_examples=8)
+@given(seed=st.integers(0, 2**32 - 1))
+def test_no_contact_whatever_torque_is_asked_for(seed):
+    rng = np.random.default_rng(seed)
+    law = SpeedLaw(BOUND, SpeedParameters())
+    guard = StoppingGuard(ARM, law, DT)
+    dynamics = InverseDynamics(ARM, HELD_SHARE * ARM.limits.acceleration)
+    q, v = ARM.postures["hanging"], np.zeros(2)
+    pull = rng.uniform(-10.0, 10.0, 2)
+    for k in range(400):
+        if k % 150 == 0:
+            pull = rng.uniform(-10.0, 10.0, 2)
+        distance = BOUND.clearance.distances(q)
+        assert (distance > 0.0).all()
+        dynamics.update(q, v)
+        wanted = dynamics.torque(-0.2 * v, pull)
+        tau = guard.torque(dynamics, q, v, wanted, distance)
+        assert (np.abs(tau) <= ARM.limits.effort).all()
+        v = v + DT * pin.aba(ARM.model, ARM.data, q, v, tau)
+        q = pin.integrate(ARM.model, q, DT * v)
+
+
+def test_what_is_harmless_is_let_through():
+    guard = StoppingGuard(ARM, SpeedLaw(BOUND, SpeedParameters()), DT)
+    dynamics = InverseDynamics(ARM, ARM.limits.acceleration)
+    q, v = ARM.postures["hanging"], np.zeros(2)
+    dynamics.update(q, v)
+    wanted = dynamics.torque(v, np.array([1.0, 0.0]))
+    assert guard.torque(dynamics, q, v, wanted, BOUND.clearance.distances(q)) is wanted
