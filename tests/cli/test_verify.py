@@ -3,7 +3,7 @@ import json
 import numpy as np
 import pytest
 
-CHECKS = ["swept", "start", "goal", "limits", "replay"]
+CHECKS = ["swept", "start", "goal", "limits", "replay", "stopping"]
 
 
 def altered(swing_up, path, **changes):
