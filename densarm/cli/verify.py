@@ -19,8 +19,9 @@ def verify(run: str, json: Path | None) -> int:
 
     The checks: the swept volume of the whole motion touches neither obstacles nor the arm itself
     (swept), it begins at the start and ends at rest at the goal (start, goal), inside all limits
-    (limits), and each recorded torque leads from each state to the next (replay). The exit status
-    is 0 if all of them hold.
+    (limits), each recorded torque leads from each state to the next (replay), and from every state
+    a straight brake inside the limits ends in free space (stopping). The exit status is 0 if all
+    of them hold.
 
     \b
     Example:
