@@ -22,7 +22,7 @@ def times(name: str) -> tuple[float, float, float]:
     """Return the durations of the run, of its reference and of the fastest reference [s]."""
     found = {}
 
-    def remember(arm, path, length, period, parameters, stopping=None):  # noqa: ANN001, ANN202
+    def remember(arm, path, length, period, parameters, stopping=None):
         reference = time_path(arm, path, length, period, parameters, stopping)
         found["planned"] = reference.duration
         found["fastest"] = time_path(arm, path, length, period, ALL).duration

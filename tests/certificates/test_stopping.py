@@ -1,4 +1,4 @@
-"""The stopping part refuses a run whose reference was timed without regard to it, and that alone."""
+"""The stopping part refuses runs timed without regard to it, and it alone does."""
 
 from dataclasses import replace
 
