@@ -118,6 +118,6 @@ def test_velocity_share(bound):
     far, all_the_way = np.full(bound.clearance.n_pairs, 1e9), 1e9
     direction = np.full(NV, NV**-0.5)
     full, half = (SpeedLaw(bound, SpeedParameters(velocity_share=share)) for share in (1.0, 0.5))
-    assert half.speed(direction, far, all_the_way) == pytest.approx(
-        0.5 * full.speed(direction, far, all_the_way)
+    assert half.speed(READY, direction, far, all_the_way) == pytest.approx(
+        0.5 * full.speed(READY, direction, far, all_the_way)
     )
