@@ -10,7 +10,7 @@ import densarm.scenario
 from densarm.arm import Arm
 from densarm.catalogue import robots_folder
 from densarm.errors import DensarmError, FileContentError, InvalidValueError, UnknownNameError
-from densarm.scenario import ControlForm, GuideKind, Scenario, load_scenario
+from densarm.scenario import Scenario, load_scenario
 from densarm.scene import Scene
 
 BASE = """
@@ -42,16 +42,6 @@ def error_of(tmp_path, text):
     assert message.startswith(f"{tmp_path / 'task.toml'}: ")
     assert "\n" not in message
     return message.removeprefix(f"{tmp_path / 'task.toml'}: ")
-
-
-@pytest.mark.parametrize("name", ["swing_up", "panda_table", "panda_shelf", "panda_holding_bar"])
-def test_every_scenario_loads_by_name(name):
-    scenario = load_scenario(name)
-    assert scenario.name == name
-    assert scenario.control.form == ControlForm.TRACKING
-    assert scenario.control.guide == GuideKind.PATH
-    assert len(scenario.scene) > 0
-    assert scenario.goal.shape == (scenario.arm.nq,)
 
 
 def test_swing_up_is_figure_8():

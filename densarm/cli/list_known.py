@@ -34,13 +34,13 @@ def list_known() -> int:
         own, left_out = len(arm.collision_model.collisionPairs), len(arm.excluded_pairs)
         click.echo(f"  {name:<{name_width}}{arm.nv:>6}  {own:>10}  {left_out:>8}")
     click.echo("\nScenarios, for densarm run:")
-    click.echo(f"  {'':<{name_width}}{'robot':<{robot_width}}joints  self pairs  others  task")
+    click.echo(f"  {'':<{name_width}}{'robot':<{robot_width}}joints  self pairs  others")
     for name in scenarios:
         scenario = load_scenario(name)
         arm = scenario.arm
         own = len(arm.collision_model.collisionPairs)
         others = Clearance(arm, scenario.scene).n_pairs - own
         counts = f"{arm.nv:>6}  {own:>10}  {others:>6}"
-        row = f"  {name:<{name_width}}{arm.name:<{robot_width}}{counts}  {scenario.title}"
-        click.echo(row)
+        click.echo(f"  {name:<{name_width}}{arm.name:<{robot_width}}{counts}")
+        click.echo(f"    {scenario.title}")
     return ExitStatus.SUCCESS

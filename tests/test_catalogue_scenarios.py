@@ -1,0 +1,56 @@
+"""What every scenario of the catalogue keeps to."""
+
+from functools import cache
+
+import pytest
+
+from densarm.catalogue import scenario_paths
+from densarm.clearance import Clearance
+from densarm.closed_loop import simulate
+from densarm.outcome import Outcome
+from densarm.scenario import ControlForm, GuideKind, Scenario, load_scenario
+from densarm.swept_bound import SweptBound
+
+loaded = cache(load_scenario)
+
+
+@pytest.fixture(params=scenario_paths())
+def scenario(request) -> Scenario:
+    return loaded(request.param)
+
+
+def test_the_tasks_that_people_are_told_of_are_known():
+    known = {"three_link_gate", "ur5_bin", "xarm7_posts", "kinova_posts", "z1_window"}
+    panda = {"panda_table", "panda_shelf", "panda_holding_bar"}
+    assert known | panda | {"so101_desk", "swing_up"} <= set(scenario_paths())
+
+
+def test_scenario_has_a_title_obstacles_and_default_control(scenario):
+    assert scenario.title != scenario.name
+    assert len(scenario.scene) > 0
+    assert scenario.control.form == ControlForm.TRACKING
+    assert scenario.control.guide == GuideKind.PATH
+
+
+def test_start_and_goal_are_clear_and_the_straight_segment_is_not(scenario):
+    arm = scenario.arm
+    bound = SweptBound(Clearance(arm, scenario.scene), scenario.control.margin)
+    for q in (scenario.start, scenario.goal):
+        assert bound.slack(q).min() > 0.0
+        angles = arm.angles(q)
+        assert ((angles >= arm.limits.lower) & (angles <= arm.limits.upper)).all()
+    assert not bound.segment_is_clear(scenario.start, scenario.goal)
+
+
+def test_kinova_goes_the_short_way_round():
+    scenario = loaded("kinova_posts")
+    arm = scenario.arm
+    step = arm.difference(scenario.start, scenario.goal)
+    assert abs(arm.angles(scenario.start)[0] + step[0]) > 3.15
+    run = simulate(scenario)
+    assert (run.outcome, run.certified) == (Outcome.REACHED, True), run.detail
+
+
+def test_a_part_is_carried_out_of_a_bin():
+    run = simulate(loaded("ur5_bin"))
+    assert (run.outcome, run.certified) == (Outcome.REACHED, True), run.detail
