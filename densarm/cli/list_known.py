@@ -2,7 +2,6 @@
 
 import click
 
-from densarm.catalogue import robot_names, scenario_paths
 from densarm.cli.exit_status import ExitStatus
 
 
@@ -20,6 +19,7 @@ def list_known() -> int:
       densarm list
     """  # noqa: D301
     from densarm.arm import load_arm
+    from densarm.catalogue import robot_names, scenario_paths
     from densarm.clearance import Clearance
     from densarm.scenario import load_scenario
 
