@@ -15,6 +15,8 @@ import numpy as np
 from densarm.arrays import Array
 from densarm.atomic_file import atomic_file
 from densarm.certificates.certificate import Certificate, certify
+from densarm.certificates.energy import EnergyRecord, record_energy
+from densarm.certificates.rantzer import RantzerRecord, record_rantzer
 from densarm.errors import DensarmError, FileContentError
 from densarm.outcome import Outcome
 from densarm.scenario import Scenario
@@ -46,6 +48,14 @@ class Trajectory:
     def verify(self) -> Certificate:
         """Return what is proved about the run, computed anew from the record."""
         return certify(self.scenario, self.time, self.q, self.v, self.tau)
+
+    def energy(self) -> EnergyRecord:
+        """Return whether the run's energy never grew, where that can be asked."""
+        return record_energy(self.scenario, self.q, self.v, self.tau)
+
+    def rantzer(self) -> RantzerRecord:
+        """Return where along the run Rantzer's condition held."""
+        return record_rantzer(self.scenario, self.q)
 
     @cached_property
     def certificate(self) -> Certificate:

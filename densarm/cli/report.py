@@ -4,6 +4,8 @@ import click
 import numpy as np
 
 from densarm.certificates.certificate import Certificate
+from densarm.certificates.energy import EnergyRecord
+from densarm.certificates.rantzer import RantzerRecord
 from densarm.outcome import Outcome
 from densarm.trajectory import Trajectory
 
@@ -29,6 +31,22 @@ def print_certificate(certificate: Certificate) -> None:
     click.echo(f"{'certified':<{_COLUMN}}{_verdict(certificate.certified)}")
     for check in certificate.checks:
         click.echo(f"  {check.name:<{_COLUMN - 2}}{_verdict(check.holds)}  {check.detail}")
+
+
+def print_records(energy: EnergyRecord, rantzer: RantzerRecord) -> None:
+    """Print what is recorded of a run without being a part of its certificate."""
+    click.echo("recorded, not certified")
+    click.echo(f"  {'energy':<{_COLUMN - 2}}{energy.verdict}: {energy.detail}")
+    click.echo(f"  {'Rantzer':<{_COLUMN - 2}}{_rantzer(rantzer)}")
+
+
+def _rantzer(record: RantzerRecord) -> str:
+    if record.share is None:
+        return "not applicable: no sample away from goal and contact"
+    return (
+        f"holds at {record.share:.0%} of {record.samples} samples (gauge {record.gauge}, plain "
+        f"density), smallest value {record.smallest:.3g} at t = {record.time:.3f} s"
+    )
 
 
 def _figures(run: Trajectory) -> dict[str, str]:

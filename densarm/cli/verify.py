@@ -23,6 +23,9 @@ def verify(run: str, json: Path | None) -> int:
     a straight brake inside the limits ends in free space (stopping). The exit status is 0 if all
     of them hold.
 
+    Recorded beside them, at some of the samples, and never a reason to refuse: whether the energy
+    of an unlimited regulation fell, and where Rantzer's condition held.
+
     \b
     Example:
       densarm run swing_up --save swing_up.npz
@@ -30,11 +33,16 @@ def verify(run: str, json: Path | None) -> int:
     """  # noqa: D301
     with progress() as report:
         report("proving")
-        from densarm.cli.report import print_certificate
+        from densarm.cli.report import print_certificate, print_records
         from densarm.trajectory import Trajectory
 
-        certificate = Trajectory.load(run).verify()
+        trajectory = Trajectory.load(run)
+        certificate = trajectory.verify()
+        energy, rantzer = trajectory.energy(), trajectory.rantzer()
         if json:
-            write_json(json, {"certified": certificate.certified, **asdict(certificate)})
+            records = {"energy": asdict(energy), "rantzer": asdict(rantzer)}
+            proved = {"certified": certificate.certified, **asdict(certificate)}
+            write_json(json, proved | {"recorded": records})
     print_certificate(certificate)
+    print_records(energy, rantzer)
     return ExitStatus.SUCCESS if certificate.certified else ExitStatus.FAILURE

@@ -23,6 +23,11 @@ def test_run_is_certified(command, swing_up, tmp_path):
     assert data["certified"] is True
     assert [check["name"] for check in data["checks"]] == CHECKS
     assert all(check["holds"] and check["detail"] for check in data["checks"])
+    energy, rantzer = data["recorded"]["energy"], data["recorded"]["rantzer"]
+    assert energy["verdict"] == "not applicable"
+    assert f"energy          not applicable: {energy['detail']}" in done.out
+    assert 0.0 <= rantzer["share"] <= 1.0
+    assert f"holds at {rantzer['share']:.0%} of {rantzer['samples']} samples" in done.out
 
 
 @pytest.mark.parametrize(
