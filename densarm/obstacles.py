@@ -1,5 +1,6 @@
 """Obstacles: named bodies at fixed poses, as frozen values."""
 
+import math
 from dataclasses import dataclass
 from typing import Any, Protocol
 
@@ -162,7 +163,7 @@ class HalfSpace(Body):
     def __post_init__(self) -> None:
         super().__post_init__()
         normal = np.array(finite_tuple(f"{self.name}.normal", self.normal, 3))
-        length = float(np.linalg.norm(normal))
+        length = math.hypot(*normal)
         if not 1e-6 < length < 1e6:
             raise InvalidValueError(f"{self.name}.normal", self.normal, "a direction, not zero")
         # Scaling once more would change the last digit of what is already of unit length.

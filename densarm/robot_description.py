@@ -17,6 +17,9 @@ if TYPE_CHECKING:
 DATA_WHEEL = "example-robot-data"
 """Prefix ``example-robot-data:`` of a path inside that wheel's folder of robots."""
 
+MAX_BYTES = 20_000_000
+"""Size of the largest text file that is read."""
+
 SHAPES = ("hull", "capsule")
 """What stands for collision geometry: convex hulls, or the smallest capsule around each."""
 
@@ -122,10 +125,14 @@ def read_text(path: Path) -> str:
     """Return a text file's content.
 
     Raises:
-        FileContentError: there is no such file, or it is not text.
+        FileContentError: there is no such file, it is not text, or it is too large.
     """
     try:
-        return path.read_text(encoding="utf-8-sig")
+        with path.open("rb") as file:
+            content = file.read(MAX_BYTES + 1)
+        if len(content) > MAX_BYTES:
+            raise FileContentError(path, f"larger than {MAX_BYTES / 1e6:g} MB")
+        return content.decode("utf-8-sig").replace("\r\n", "\n").replace("\r", "\n")
     except (OSError, UnicodeDecodeError) as error:
         reason = error.strerror if isinstance(error, OSError) else "not a UTF-8 text file"
         raise FileContentError(path, str(reason)) from None

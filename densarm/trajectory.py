@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 from typing import Any
-from zipfile import BadZipFile, is_zipfile
+from zipfile import BadZipFile, ZipFile, is_zipfile
 
 import numpy as np
 
@@ -123,8 +123,7 @@ class Trajectory:
             DensarmError: its scenario cannot be rebuilt, e.g. since a mesh has changed.
         """
         try:
-            if Path(path).is_file() and not is_zipfile(path):
-                raise FileContentError(path, "not a run: not a .npz file")
+            _check_archive(path)
             with Path(path).open("rb") as file, np.load(file, allow_pickle=False) as data:
                 arrays = {name: np.asarray(data[name], dtype=np.float64) for name in _ARRAYS}
                 scenario = json.loads(str(data["scenario"]))
@@ -144,6 +143,8 @@ class Trajectory:
             raise
         except DensarmError as error:
             raise FileContentError(path, f"not a run: {error}") from None
+        except (MemoryError, RecursionError):
+            raise FileContentError(path, "not a run: too large, or nested too deeply") from None
         except (ValueError, KeyError, TypeError, AttributeError, EOFError, *_DAMAGE) as error:
             raise FileContentError(path, f"not a run: {' '.join(str(error).split())}") from None
 
@@ -161,6 +162,19 @@ class Trajectory:
         return self
 
 
+def _check_archive(path: str | Path) -> None:
+    """Refuse a file that is no .npz, or one that is small packed and huge unpacked."""
+    if not Path(path).is_file():
+        return  # opening it says why
+    if not is_zipfile(path):
+        raise FileContentError(path, "not a run: not a .npz file")
+    with ZipFile(path) as archive:
+        size = sum(member.file_size for member in archive.infolist())
+    if size > _MAX_BYTES:
+        raise FileContentError(path, f"not a run: larger than {_MAX_BYTES / 1e9:g} GB")
+
+
+_MAX_BYTES = 4_000_000_000  # unpacked; the longest run of a seven-joint arm has half of it
 _UNIT_TOLERANCE = 1e-6
 _DAMAGE = (BadZipFile, zlib.error, NotImplementedError)  # what reading a damaged archive raises
 _ARRAYS = ("time", "q", "v", "tau", "clearance")

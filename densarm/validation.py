@@ -46,7 +46,7 @@ def unit_quaternion(name: str, value: ArrayLike) -> tuple[float, ...]:
         InvalidValueError: a wrong shape, an entry that is not finite, or another length.
     """
     quaternion = finite_vector(name, value, 4)
-    norm = float(np.linalg.norm(quaternion))
+    norm = math.hypot(*quaternion)
     if abs(norm - 1.0) > 0.01:
         raise InvalidValueError(name, value, "a unit quaternion x y z w")
     # Scaling once more would change the last digit of what is already of unit length.

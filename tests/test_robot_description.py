@@ -106,6 +106,18 @@ def test_text_files(tmp_path):
         read_text(tmp_path)
 
 
+@pytest.mark.parametrize("end", ["\n", "\r\n", "\r"])
+def test_lines_may_end_in_any_way(tmp_path, end):
+    file = tmp_path / "robot.urdf"
+    file.write_bytes(f"a{end}b{end}".encode())
+    assert read_text(file) == "a\nb\n"
+
+
+def test_endless_text_is_refused():
+    with pytest.raises(FileContentError, match="larger than 20 MB"):
+        read_text(Path("/dev/zero"))
+
+
 def test_toml(tmp_path):
     file = tmp_path / "arm.toml"
     file.write_text("a = 1")

@@ -166,6 +166,29 @@ def test_wrong_shapes_and_values(tmp_path, content, name):
     error_of(written(path, {**content, name: np.array("text")}))
 
 
+def test_an_array_that_claims_to_be_larger_than_memory(tmp_path, content):
+    path = written(tmp_path / "other.npz", content)
+    with zipfile.ZipFile(path) as old:
+        entries = {info.filename: old.read(info) for info in old.infolist()}
+    claim = b"(20, 400000000000000), }"
+    entries["q.npy"] = entries["q.npy"].replace(b"(20, 4), }".ljust(len(claim)), claim)
+    with zipfile.ZipFile(path, "w") as new:
+        for name, data in entries.items():
+            new.writestr(name, data)
+    assert "too large" in error_of(path)
+
+
+def test_a_small_file_of_a_huge_run(tmp_path, short, monkeypatch):
+    monkeypatch.setattr("densarm.trajectory._MAX_BYTES", 1000)
+    short.save(tmp_path / "run.npz")
+    assert "larger than" in error_of(tmp_path / "run.npz")
+
+
+def test_scenario_nested_too_deeply(tmp_path, content):
+    content["scenario"] = np.array("[" * 100_000 + "]" * 100_000)
+    assert "nested too deeply" in error_of(written(tmp_path / "other.npz", content))
+
+
 def test_no_sample(tmp_path, content):
     error_of(written(tmp_path / "run.npz", {**content, **{n: content[n][:0] for n in ARRAYS}}))
 

@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import Any
 
 from densarm.errors import DensarmError, FileContentError, InvalidValueError
+from densarm.robot_description import read_text
 from densarm.scene import Scene
-from densarm.scene_files.bounded_text import bounded_text
 from densarm.validation import finite_number, finite_tuple, non_negative_integer
 
 
@@ -48,7 +48,7 @@ def read_motion_problems(path: Path) -> tuple[MotionProblem, ...]:
     """
     where = ""
     try:
-        data = json.loads(bounded_text(path))
+        data = json.loads(read_text(path))
         metadata, entries = data["metadata"], data["problems"]
         problems = []
         for k, entry in enumerate(entries):

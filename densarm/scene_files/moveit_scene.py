@@ -6,8 +6,8 @@ import pinocchio as pin
 
 from densarm.errors import DensarmError, FileContentError, InvalidValueError
 from densarm.obstacles import Obstacle
+from densarm.robot_description import read_text
 from densarm.scene import Scene
-from densarm.scene_files.bounded_text import bounded_text
 from densarm.scene_files.moveit_shapes import (
     moveit_mesh,
     moveit_obstacle,
@@ -34,7 +34,7 @@ def read_moveit_scene(path: Path) -> Scene:
     Raises:
         FileContentError: it cannot be read, or is no such file, with the line.
     """
-    words = _Words(bounded_text(path))
+    words = _Words(read_text(path))
     try:
         return Scene(_obstacles(words))
     except DensarmError as error:

@@ -1,5 +1,6 @@
 """Shapes of MoveIt's messages and files as obstacles."""
 
+import math
 from collections.abc import Sequence
 from typing import Any
 
@@ -58,7 +59,7 @@ def moveit_obstacle(name: str, kind: str, sizes: Sequence[float], pose: pin.SE3)
         return Cylinder(radius=sizes[0], length=sizes[1], **placed)
     if kind == "cone":
         return Mesh(pieces=(_cone_corners(name, *sizes),), **placed)
-    scale = float(np.linalg.norm(sizes[:3])) or 1.0  # zero is refused by the half-space
+    scale = math.hypot(*sizes[:3]) or 1.0  # zero is refused by the half-space
     return HalfSpace(normal=tuple(sizes[:3]), offset=-sizes[3] / scale, **placed)
 
 

@@ -11,8 +11,8 @@ from densarm.attachment import Attachment
 from densarm.errors import DensarmError, FileContentError, InvalidValueError
 from densarm.mesh import Mesh
 from densarm.obstacles import Obstacle
+from densarm.robot_description import read_text
 from densarm.scene import Scene
-from densarm.scene_files.bounded_text import bounded_text
 from densarm.scene_files.moveit_shapes import (
     moveit_mesh,
     moveit_obstacle,
@@ -71,7 +71,7 @@ def _load(path: Path) -> Any:
     """
     import yaml
 
-    text = bounded_text(path)
+    text = read_text(path)
     loader = getattr(yaml, "CBaseLoader", yaml.BaseLoader)
     depth = 0
     try:

@@ -218,5 +218,10 @@ def test_other_files(tmp_path):
         load_scene(tmp_path / "scene.world")
     large = tmp_path / "large.scene"
     large.write_bytes(b"\n" * 20_000_001)
-    with pytest.raises(FileContentError, match="larger than the 20 MB"):
+    with pytest.raises(FileContentError, match="larger than 20 MB"):
         load_scene(large)
+
+
+def test_an_orientation_whose_square_overflows(tmp_path):
+    with pytest.raises(FileContentError, match="must be a unit quaternion"):
+        read(tmp_path, OLD.replace("0 0 0 1", "0 0 0 1e308", 1))
