@@ -1,0 +1,40 @@
+"""Ways to make a certified run fail a part of its certificate, each sure to fail it."""
+
+from tampering import claim, file, obstruction, record
+from tampering.kind import Kind, NotPossibleError
+
+__all__ = ["KINDS", "Kind", "NotPossibleError"]
+
+KINDS = {
+    "one position changed": Kind("replay", record.position),
+    "one velocity changed": Kind("replay", record.velocity),
+    "one torque changed": Kind("replay", record.torque),
+    "torques shifted in time": Kind("replay", record.shifted_torque),
+    "sample skipped": Kind("replay", record.skipped_sample),
+    "sample repeated": Kind("replay", record.repeated_sample),
+    "teleport": Kind("replay", record.teleport),
+    "joints swapped": Kind("start", record.swapped_joints),
+    "one time stamp changed": Kind("start", record.time_stamp),
+    "time scaled": Kind("start", record.time_scale),
+    "another time step": Kind("replay", claim.time_step),
+    "another integrator": Kind("replay", claim.integrator),
+    "another mass": Kind("replay", claim.mass),
+    "base tilted": Kind("replay", claim.tilted_base),
+    "start moved": Kind("start", claim.start_moved),
+    "goal moved": Kind("goal", claim.goal_moved),
+    "starts in motion": Kind("start", claim.starts_in_motion),
+    "ends in motion": Kind("goal", claim.ends_in_motion),
+    "torque limit lowered": Kind("limits", claim.weaker),
+    "velocity limit lowered": Kind("limits", claim.slower),
+    "acceleration limit lowered": Kind("limits", claim.gentler),
+    "position limit narrowed": Kind("limits", claim.narrower),
+    "obstacle on the way": Kind("swept", obstruction.obstacle_on_the_way),
+    "obstacle moved": Kind("swept", obstruction.obstacle_moved),
+    "obstacle enlarged": Kind("swept", obstruction.obstacle_enlarged),
+    "obstacle between samples": Kind("swept", obstruction.obstacle_between_samples),
+    "brake blocked": Kind("stopping", obstruction.blocked_brake),
+    "entry not finite": Kind("file", file.not_finite),
+    "row missing": Kind("file", file.missing_row),
+    "mesh changed": Kind("file", file.other_mesh),
+}
+"""All ways, by name."""

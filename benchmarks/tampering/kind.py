@@ -1,0 +1,44 @@
+"""A way to make a certified run fail, and what all ways share."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from densarm import Trajectory
+
+ROWS = ("time", "q", "v", "tau", "clearance")
+_MOVING = 0.05  # [rad/s], slowest motion that a left-out sample shows in
+
+
+class NotPossibleError(Exception):
+    """This run cannot be made to fail in this way."""
+
+
+@dataclass(frozen=True)
+class Kind:
+    """A way to tamper with a run."""
+
+    part: str
+    """The part of the certificate that must fail; "file" where the file must be refused."""
+    tamper: Callable[[Trajectory, np.random.Generator], Trajectory]
+
+
+def exponent(rng, low, high):
+    """Return a number between 10^low and 10^high, even in its logarithm, of either sign."""
+    return float(10.0 ** rng.uniform(low, high) * rng.choice([-1.0, 1.0]))
+
+
+def moving_sample(run, rng):
+    moving = np.flatnonzero(np.abs(run.v).max(axis=1) > _MOVING)
+    return int(rng.choice(moving[(moving > 1) & (moving < len(run.q) - 3)]))
+
+
+def regridded(run, rows):
+    """Return the run of some of its samples as if no other had been."""
+    arrays = {name: getattr(run, name)[rows] for name in ROWS[1:]}
+    return replace(run, time=run.scenario.simulation.dt * np.arange(len(rows)), **arrays)
+
+
+def with_scenario(run, **changes):
+    return replace(run, scenario=replace(run.scenario, **changes))
