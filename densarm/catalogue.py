@@ -63,3 +63,5 @@ def read_toml(path: Path) -> dict[str, Any]:
         return tomllib.loads(read_text(path))
     except tomllib.TOMLDecodeError as error:
         raise FileContentError(path, f"not TOML: {error}") from None
+    except RecursionError:
+        raise FileContentError(path, "not TOML: nested too deeply") from None

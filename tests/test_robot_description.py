@@ -125,6 +125,9 @@ def test_toml(tmp_path):
     file.write_text("a = \n")
     with pytest.raises(FileContentError, match=r"arm.toml: not TOML: .*line 1"):
         read_toml(file)
+    file.write_text(f"a = {'[' * 5000}{']' * 5000}")
+    with pytest.raises(FileContentError, match="nested too deeply"):
+        read_toml(file)
 
 
 def test_xml():
