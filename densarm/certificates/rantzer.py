@@ -10,7 +10,7 @@ from densarm.density import rantzer_condition
 from densarm.scenario import Scenario
 from densarm.simulation.fixed_step_loop import REACHED_POSITION
 
-_SAMPLES = 10  # of the run at most that are looked at
+_SAMPLES = 6  # of the run at most that are looked at
 
 
 @dataclass(frozen=True)
@@ -32,7 +32,7 @@ class RantzerRecord:
 def record_rantzer(scenario: Scenario, q: Array) -> RantzerRecord:
     r"""Record where along a run the condition :math:`\nabla\cdot(\rho k) \ge 0` holds.
 
-    It is the condition of the plain density, towards the goal and without sub-goals, at 10 samples
+    It is the condition of the plain density, towards the goal and without sub-goals, at 6 samples
     at most, evenly spaced; samples at the goal or in contact, where ρ is infinite or zero, are
     left out.
 

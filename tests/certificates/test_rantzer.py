@@ -58,4 +58,4 @@ def test_goal_and_contact_are_left_out(free):
 
 def test_long_runs_are_looked_at_now_and_then(free):
     q = free.arm.configurations(np.linspace([0.1, 0.1], [1.0, 1.0], 1000))
-    assert 8 <= record_rantzer(free, q).samples <= 10
+    assert 5 <= record_rantzer(free, q).samples <= 6
