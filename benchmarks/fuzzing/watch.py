@@ -45,7 +45,7 @@ class Watch:
         shown = os.dup(1), os.dup(2)
         for stream in (1, 2):
             os.dup2(self._output.fileno(), stream)
-        faulthandler.dump_traceback_later(self._seconds, exit=True, file=self._report(shown[1]))
+        faulthandler.dump_traceback_later(self._seconds, exit=True, file=shown[1])
         self._watching = True
         try:
             yield
@@ -61,10 +61,6 @@ class Watch:
             os.lseek(self._output.fileno(), 0, os.SEEK_SET)
             self.notes.append("printed")
         self.notes += [f"left {name}" for name in self._content() - before]
-
-    @staticmethod
-    def _report(stream: int) -> int:
-        return stream
 
     def _content(self) -> set[str]:
         return {str(path) for path in self._folder.rglob("*")}
