@@ -38,7 +38,8 @@ class EnergyRecord:
     samples: int
     """Samples at which the energy was computed."""
     largest_rise: float | None
-    """Largest change from one to the next in units of the first energy; None if not computed."""
+    """Largest change from one to the next in units of the first energy; None if not computed
+    or infinite."""
 
 
 def record_energy(scenario: Scenario, q: Array, v: Array, tau: Array) -> EnergyRecord:
@@ -78,7 +79,8 @@ def record_energy(scenario: Scenario, q: Array, v: Array, tau: Array) -> EnergyR
 
 
 def _judged(energy: Array, time: Array) -> EnergyRecord:
-    rise = np.diff(energy) / (energy[0] or 1.0)
+    with np.errstate(over="ignore"):  # from next to nothing to a contact
+        rise = np.diff(energy) / (energy[0] or 1.0)
     largest = float(rise.max(initial=-1.0))
     if largest <= _ROUNDING:
         detail = f"never grew from {energy[0]:.3g} to {energy[-1]:.3g} at {len(energy)} samples"
@@ -87,7 +89,8 @@ def _judged(energy: Array, time: Array) -> EnergyRecord:
     detail = (
         f"grew by {largest:.2g} times its first before t = {at:.3f} s, at {len(energy)} samples"
     )
-    return EnergyRecord(EnergyVerdict.VIOLATED, detail, len(energy), largest)
+    finite = largest if np.isfinite(largest) else None
+    return EnergyRecord(EnergyVerdict.VIOLATED, detail, len(energy), finite)
 
 
 def _other_kind(scenario: Scenario) -> str:

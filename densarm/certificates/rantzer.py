@@ -49,8 +49,10 @@ def record_rantzer(scenario: Scenario, q: Array) -> RantzerRecord:
     density, values, times = plain_density(scenario), [], []
     for k in looked_at:
         if np.isfinite(density.evaluate(q[k]).log_value):
-            values.append(float(rantzer_condition(density, q[k], arm.integrate).margin(gauge)))
-            times.append(float(k * scenario.simulation.dt))
+            value = float(rantzer_condition(density, q[k], arm.integrate).margin(gauge))
+            if np.isfinite(value):
+                values.append(value)
+                times.append(float(k * scenario.simulation.dt))
     if not values:
         return RantzerRecord(str(gauge), 0, None, None, None)
     least = int(np.argmin(values))

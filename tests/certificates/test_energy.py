@@ -107,3 +107,18 @@ def test_a_fast_run_is_limited(swing_up):
 def test_an_arm_that_never_moved(free_run):
     rows = {name: getattr(free_run, name)[:1] for name in ("q", "v", "tau")}
     assert record(replace(free_run, **rows)).detail == "no motion"
+
+
+def test_a_rise_beyond_the_doubles_is_no_number(free_run):
+    """What is recorded can be written as JSON, however wild the run."""
+    arm, gains = free_run.scenario.arm, free_run.scenario.gains
+    q = np.tile(free_run.scenario.goal, (3, 1))
+    v = np.array([[1e-160, 0.0], [1e100, 0.0], [0.0, 0.0]])
+    tau = np.array(
+        [
+            arm.nonlinear_effects(q[k], v[k]) - gains.velocity * arm.mass_matrix(q[k]) @ v[k]
+            for k in range(3)
+        ]
+    )
+    result = record_energy(free_run.scenario, q, v, tau)
+    assert (result.verdict, result.largest_rise) == (EnergyVerdict.VIOLATED, None)
