@@ -1,0 +1,35 @@
+"""GuardStatus: whether a guarded controller acts, and if not, why."""
+
+from dataclasses import dataclass
+from enum import StrEnum
+
+
+class GuardWord(StrEnum):
+    """What a guard is about, or what it found."""
+
+    ACTING = "acting"
+    """Nothing is wrong; the guarded controller acts."""
+    NOT_A_STATE = "not_a_state"
+    """The state had a wrong shape, was not finite, not on the unit circle or beyond reason."""
+    JUMPED = "jumped"
+    """The state is not where the dynamics could have brought it."""
+    FROZEN = "frozen"
+    """The configuration stayed the same while the arm must have moved."""
+    LATE = "late"
+    """Too much time passed between two calls."""
+    CLOCK = "clock"
+    """The time was not a finite number, or ran backwards."""
+    NO_TORQUE = "no_torque"
+    """The guarded controller failed, or gave a torque that is not finite or beyond the limits."""
+    STOPPED = "stopped"
+    """The caller asked for it."""
+
+
+@dataclass(frozen=True)
+class GuardStatus:
+    """The first thing that went wrong since the guarded controller last acted."""
+
+    word: GuardWord = GuardWord.ACTING
+    """What it was."""
+    sentence: str = "The controller acts."
+    """The same in words, with the time and the values."""

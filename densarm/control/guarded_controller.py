@@ -1,0 +1,270 @@
+"""GuardedController: a controller that brakes and holds when something is wrong."""
+
+import math
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from densarm.arm import Arm
+from densarm.arrays import Array
+from densarm.compiled import compiled
+from densarm.control.brake_and_hold import BrakeAndHold
+from densarm.control.controller import Controller, checked_state
+from densarm.control.gains import Gains
+from densarm.control.guard_status import GuardStatus, GuardWord
+from densarm.control.guard_tolerances import GuardTolerances
+from densarm.control.state_observer import StateObserver
+from densarm.validation import positive
+
+HOLDING_GAINS = Gains(position=50.0, velocity=15.0)
+"""Stable with a delay of 50 ms in the state, by a phase margin of 33 degrees."""
+
+_FASTEST = 10.0  # of the velocity limits: beyond it a number is no velocity
+_UNLIMITED_FASTEST = 100.0  # [rad/s or m/s]
+_FARTHEST = 1e6  # [rad or m]
+_LONGEST_PREDICTION = 0.25  # [s]
+_ROUNDING = 1e-9  # relative, of torques at their limits
+_SLOW = 0.01  # [rad/s or m/s], which counts as rest
+
+Measured = tuple[Array, Array]
+
+
+class GuardedController:
+    """Passes on another controller's torque while all is well, and else stops the arm.
+
+    All is well while the state is one, the dynamics explain how it came from the last one under
+    the torque between (see `StateObserver`), calls come in time, and the controller gives a finite
+    torque within the limits. Else the arm brakes along a straight line and holds still, until
+    `resume` is called: a controller that follows a reference in time would otherwise chase what
+    went on without it. `torque` never raises, and whatever it is given its result is finite and
+    within the torque limits. Without a fault it is the guarded controller's, bit for bit.
+
+    What it rests on. A measured state that does not agree is left out, and the arm is braked where
+    the dynamics say that it is; one that then agrees with itself for the time `delay` is believed.
+    Without any believable state the arm is held by the torque that the model's gravity asks for at
+    the observed rest. That is no feedback: what the model does not know (payload, friction, a
+    push) moves the arm unseen, and an arm held upright falls in the end. Close mechanical brakes
+    then. Before the first state there is nothing to hold by, and the torque is zero. A state that
+    stays the same while the arm rests, that drifts slower than `GuardTolerances` allow, or a wrong
+    scene, cannot be noticed from here: who watches these calls `stop`. Between two calls nothing
+    can be done: a torque is held until the next one comes.
+
+    Args:
+        arm: the arm, as the plant is.
+        controller: acts while all is well.
+        period: time between two calls [s].
+        tolerances: what counts as normal.
+        gains: hold the arm at rest.
+
+    Raises:
+        InvalidValueError: a period that is not positive.
+    """
+
+    def __init__(
+        self,
+        arm: Arm,
+        controller: Controller,
+        period: float,
+        tolerances: GuardTolerances | None = None,
+        gains: Gains = HOLDING_GAINS,
+    ) -> None:
+        self._arm = arm
+        self._controller = controller
+        self._period = positive("period", period)
+        self._tolerances = tolerances or GuardTolerances()
+        velocity = arm.limits.velocity
+        self._fastest = np.where(np.isfinite(velocity), _FASTEST * velocity, _UNLIMITED_FASTEST)
+        self._brake = BrakeAndHold(arm, gains, period)
+        self._observer = StateObserver(arm, self._fastest, self._tolerances)
+        self._candidate = StateObserver(arm, self._fastest, self._tolerances)
+        self._agreed_for: float | None = None  # the candidate, if there is one
+        self._status = GuardStatus()
+        self._tau = np.zeros(arm.nv)
+        self._time: float | None = None
+        self._longest_gap = max(self._tolerances.gap, 1.5 * period)
+        self._last_q = np.full(arm.nq, np.nan)  # as measured
+        self._knows_state = self._trusts_state = self._brakes_anew = False
+        self._state = self._observer.q, self._observer.v
+
+    @property
+    def status(self) -> GuardStatus:
+        """Whether the controller acts, and if not, why."""
+        return self._status
+
+    @property
+    def trusts_state(self) -> bool:
+        """Whether the last state was believed."""
+        return self._trusts_state
+
+    @property
+    def is_at_rest(self) -> bool:
+        """Whether the arm was stopped, and rests as far as is known."""
+        return self._brake.is_holding and bool(np.abs(self._state[1]).max() <= _SLOW)
+
+    def stop(self, why: str = "The caller asked to stop.") -> None:
+        """Brake from the next call of `torque` on, and hold still.
+
+        Args:
+            why: for the status, e.g. how the scene has changed.
+        """
+        self._stop(GuardWord.STOPPED, why)
+
+    def resume(self, controller: Controller | None = None) -> bool:
+        """Let a controller act again, if the arm rests and the last state was believed.
+
+        Args:
+            controller: acts from now on, e.g. along a new plan; None for the one before, which
+                fits a law without a reference in time. The next call may have any time.
+
+        Returns:
+            Whether it acts.
+        """
+        acts = self._status.word == GuardWord.ACTING
+        if not acts and not (self.is_at_rest and self._trusts_state):
+            return False
+        self._controller = controller or self._controller
+        self._status = GuardStatus()
+        self._time = None
+        return True
+
+    def torque(self, t: float, q: ArrayLike, v: ArrayLike) -> Array:
+        """Act as `Controller.torque`, but never raise: see `status`."""
+        dt = self._elapsed(t)
+        measured = self._measured(t, q, v)
+        self._observe(t, measured, dt)
+        acts = self._status.word == GuardWord.ACTING and measured is not None
+        if not (acts and self._passes_on(t, *self._state)):
+            self._brake_or_hold(dt)
+        return self._tau.copy()
+
+    def _stop(self, word: GuardWord, sentence: str) -> None:
+        if self._status.word == GuardWord.ACTING:
+            self._status = GuardStatus(word, sentence)
+            self._brakes_anew = True
+
+    def _elapsed(self, t: float) -> float:
+        """Return the time since the last call [s], as far as the clock can be believed."""
+        try:
+            now = float(t)
+        except (TypeError, ValueError, OverflowError):
+            now = math.nan
+        last, dt = self._time, self._period
+        self._time = now if math.isfinite(now) else last
+        if not math.isfinite(now):
+            self._stop(GuardWord.CLOCK, f"The time {t!r} is not a finite number.")
+        elif last is not None and now < last:
+            self._stop(GuardWord.CLOCK, f"The time ran back from {last:.6g} s to {now:.6g} s.")
+        elif last is not None:
+            dt = now - last
+            if dt > self._longest_gap:
+                what = f"The call at t = {now:.6g} s came {dt:.3g} s after the last one"
+                self._stop(GuardWord.LATE, f"{what}, more than {self._longest_gap:.3g} s.")
+        return dt
+
+    def _measured(self, t: float, q: ArrayLike, v: ArrayLike) -> Measured | None:
+        """Return q (nq,) and v (nv,), or None if they are no state."""
+        try:
+            q, v = checked_state(self._arm, q, v)
+        except Exception as error:  # noqa: BLE001  # a caller may give anything
+            self._stop(GuardWord.NOT_A_STATE, f"At t = {t} s, {_one_line(error)}.")
+            return None
+        if _is_plausible(q, v, _FARTHEST, self._fastest):
+            return q, v
+        why = f"At t = {t} s the state is beyond reason: velocity {v}, configuration {q}."
+        self._stop(GuardWord.NOT_A_STATE, _one_line(why))
+        return None
+
+    def _observe(self, t: float, measured: Measured | None, dt: float) -> None:
+        """Follow the dynamics, and believe the measured state if it agrees with them."""
+        self._observer.advance(min(dt, _LONGEST_PREDICTION), self._period, self._tau)
+        self._trusts_state = False
+        if measured is None:
+            self._agreed_for = None
+        elif not self._knows_state or dt > _LONGEST_PREDICTION:
+            self._believe(*measured)
+        elif self._observer.agrees(*measured, dt):
+            self._trusts_state, self._agreed_for = True, None
+        else:
+            self._doubt(t, *measured, dt)
+        self._state = self._observer.q, self._observer.v
+        if measured is not None:
+            self._last_q[:] = measured[0]
+            if self._trusts_state:
+                self._state = measured
+
+    def _believe(self, q: Array, v: Array) -> None:
+        self._observer.start(q, v)
+        self._knows_state = self._trusts_state = self._brakes_anew = True
+        self._agreed_for = None
+
+    def _doubt(self, t: float, q: Array, v: Array, dt: float) -> None:
+        """Brake; believe an unexplained state only once it has agreed with itself for long."""
+        frozen = bool((q == self._last_q).all())
+        off = self._arm.difference(self._observer.q, q), v - self._observer.v
+        where = f"{np.abs(off[0]).max():.3g} rad or m and {np.abs(off[1]).max():.3g} per s"
+        if frozen:
+            why = f"At t = {t:.6g} s the configuration stands still, and should be off by {where}."
+            self._stop(GuardWord.FROZEN, why)
+        else:
+            why = f"At t = {t:.6g} s the state is {where} from where the dynamics put it."
+            self._stop(GuardWord.JUMPED, why)
+        if self._agreed_for is not None and not frozen:
+            self._candidate.advance(dt, self._period, self._tau)
+            if self._candidate.agrees(q, v, dt):
+                self._agreed_for += dt
+                if self._agreed_for >= self._tolerances.delay:
+                    self._believe(q, v)
+                return
+        self._candidate.start(q, v)
+        self._agreed_for = 0.0
+
+    def _passes_on(self, t: float, q: Array, v: Array) -> bool:
+        """Take the controller's torque over if it may be applied."""
+        try:
+            tau = np.asarray(self._controller.torque(t, q, v), dtype=np.float64)
+        except Exception as error:  # noqa: BLE001  # whatever fails, the arm must be stopped
+            why = f"At t = {t:.6g} s the controller failed: {_one_line(error)}."
+            self._stop(GuardWord.NO_TORQUE, why)
+            return False
+        limit = self._arm.limits.effort
+        if tau.shape == limit.shape and _takes(tau, limit, self._tau):
+            return True
+        why = f"At t = {t:.6g} s the controller gave the torque {tau}, limits are {limit}."
+        self._stop(GuardWord.NO_TORQUE, _one_line(why))
+        return False
+
+    def _brake_or_hold(self, dt: float) -> None:
+        if not self._knows_state:
+            self._tau[:] = 0.0
+            return
+        if self._brakes_anew:
+            self._brake.begin(*self._state)
+            self._brakes_anew, dt = False, 0.0
+        tau = self._brake.torque(*self._state, dt)
+        if not _takes(tau, self._arm.limits.effort, self._tau):
+            self._tau[:] = 0.0
+
+
+def _one_line(text: object) -> str:
+    return " ".join(str(text).split())[:300]
+
+
+@compiled
+def _is_plausible(q: Array, v: Array, farthest: float, fastest: Array) -> bool:
+    is_plausible = True
+    for x in q:
+        is_plausible &= abs(x) <= farthest
+    for i in range(v.size):
+        is_plausible &= abs(v[i]) <= fastest[i]
+    return is_plausible
+
+
+@compiled
+def _takes(tau: Array, limit: Array, out: Array) -> bool:
+    """Copy a torque if it is finite and within the limits up to rounding, clipped to them."""
+    for i in range(tau.size):
+        if not (math.isfinite(tau[i]) and abs(tau[i]) <= limit[i] * (1.0 + _ROUNDING)):
+            return False
+    for i in range(tau.size):
+        out[i] = min(max(tau[i], -limit[i]), limit[i])
+    return True
