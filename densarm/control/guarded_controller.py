@@ -178,37 +178,34 @@ class GuardedController:
         """Follow the dynamics, and believe the measured state if it agrees with them."""
         self._observer.advance(min(dt, _LONGEST_PREDICTION), self._period, self._tau)
         self._trusts_state = False
+        repeats = measured is not None and _repeats(measured[0], self._last_q)
         if measured is None:
             self._agreed_for = None
         elif not self._knows_state or dt > _LONGEST_PREDICTION:
             self._believe(*measured)
-        elif self._observer.agrees(*measured, dt):
+        elif self._observer.agrees(*measured, 0.0 if repeats else dt):
             self._trusts_state, self._agreed_for = True, None
         else:
-            self._doubt(t, *measured, dt)
-        self._state = self._observer.q, self._observer.v
-        if measured is not None:
-            self._last_q[:] = measured[0]
-            if self._trusts_state:
-                self._state = measured
+            self._doubt(t, *measured, dt, repeats)
+        trusted = measured is not None and self._trusts_state
+        self._state = measured if trusted else (self._observer.q, self._observer.v)
 
     def _believe(self, q: Array, v: Array) -> None:
         self._observer.start(q, v)
         self._knows_state = self._trusts_state = self._brakes_anew = True
         self._agreed_for = None
 
-    def _doubt(self, t: float, q: Array, v: Array, dt: float) -> None:
+    def _doubt(self, t: float, q: Array, v: Array, dt: float, repeats: bool) -> None:
         """Brake; believe an unexplained state only once it has agreed with itself for long."""
-        frozen = bool((q == self._last_q).all())
         off = self._arm.difference(self._observer.q, q), v - self._observer.v
         where = f"{np.abs(off[0]).max():.3g} rad or m and {np.abs(off[1]).max():.3g} per s"
-        if frozen:
+        if repeats:
             why = f"At t = {t:.6g} s the configuration stands still, and should be off by {where}."
             self._stop(GuardWord.FROZEN, why)
         else:
             why = f"At t = {t:.6g} s the state is {where} from where the dynamics put it."
             self._stop(GuardWord.JUMPED, why)
-        if self._agreed_for is not None and not frozen:
+        if self._agreed_for is not None and not repeats:
             self._candidate.advance(dt, self._period, self._tau)
             if self._candidate.agrees(q, v, dt):
                 self._agreed_for += dt
@@ -247,6 +244,16 @@ class GuardedController:
 
 def _one_line(text: object) -> str:
     return " ".join(str(text).split())[:300]
+
+
+@compiled
+def _repeats(q: Array, last: Array) -> bool:
+    """Return whether q is the last one again, and keep it."""
+    repeats = True
+    for i in range(q.size):
+        repeats &= q[i] == last[i]
+        last[i] = q[i]
+    return repeats
 
 
 @compiled

@@ -74,7 +74,7 @@ class StateObserver:
         Args:
             q: configuration (nq,).
             v: velocity (nv,) [rad/s or m/s].
-            time: since the last measurement [s].
+            time: since the last measurement [s]; zero for one that tells nothing new.
         """
         return _draw(
             q,

@@ -1,0 +1,275 @@
+"""Inject faults into running controllers: does the guard keep the limits and the arm clear?
+
+python benchmarks/faults.py --faults 1000 --json faults.json
+
+Each fault begins at a random sample of a recorded run of the scenario. The arm goes on under
+`GuardedController`, from shortly before the fault until it rests. A contact counts against the
+guard if `StoppingCheck` proves the straight brake from the fault's sample clear.
+"""
+
+import argparse
+import json
+import time
+from dataclasses import dataclass
+from itertools import cycle, islice, product
+from pathlib import Path
+
+import numpy as np
+import pinocchio as pin
+
+import densarm
+from densarm.control.guarded_controller import GuardedController
+from densarm.stopping_check import StoppingCheck
+from densarm.straight_brake import StraightBrake
+
+SCENARIOS = ("panda_table", "ur5_bin", "swing_up")
+LEAD = 50  # samples of the run before the fault
+LONGEST = 2000  # samples simulated after it begins
+AT_REST = 300  # samples at rest after which a case ends
+SLOW = 2e-3  # [rad/s], which counts as rest
+GAP = (5, 51)  # samples by which calls or states are late
+GARBAGE = (np.nan, np.inf, -np.inf, 1e300, -1e9)
+
+
+class Fault:
+    """What the controller gets instead of the state, from the sample at which it begins."""
+
+    name = "none"
+
+    def __init__(self, rng, arm, length):
+        self.rng, self.arm, self.length = rng, arm, length
+
+    def state(self, k, states):
+        """The state that is seen k samples after the fault began, of all states so far."""
+        return self.wrong(k, states) if k < self.length else states[-1]
+
+    def wrong(self, _, states):
+        return states[-1]
+
+    def is_called(self, _):
+        return True
+
+    def fails(self, _):
+        return False
+
+
+class NotFinite(Fault):
+    name = "not finite"
+
+    def __init__(self, *args):
+        super().__init__(*args)
+        self.row, self.joint = self.rng.integers(2), self.rng.integers(self.arm.nv)
+        self.garbage = GARBAGE[self.rng.integers(len(GARBAGE))]
+
+    def wrong(self, _, states):
+        state = [x.copy() for x in states[-1]]
+        state[self.row][self.joint] = self.garbage
+        return state
+
+
+class LateCall(Fault):
+    name = "late call"
+
+    def __init__(self, *args):
+        super().__init__(*args)
+        self.gap = self.rng.integers(*GAP)
+
+    def is_called(self, k):
+        return k >= self.gap
+
+
+class DelayedState(Fault):
+    name = "delayed state"
+
+    def __init__(self, *args):
+        super().__init__(*args)
+        self.gap = self.rng.integers(*GAP)
+
+    def wrong(self, _, states):
+        return states[-1 - self.gap]
+
+
+class Jump(Fault):
+    name = "jump"
+
+    def __init__(self, *args):
+        super().__init__(*args)
+        rng, nv = self.rng, self.arm.nv
+        self.dq = rng.normal(size=nv) * 10.0 ** rng.uniform(-3.0, 0.0) * (rng.random() < 0.7)
+        self.dv = rng.normal(size=nv) * 10.0 ** rng.uniform(-1.0, 1.0) * (rng.random() < 0.5)
+
+    def wrong(self, _, states):
+        q, v = states[-1]
+        return self.arm.integrate(q, self.dq), v + self.dv
+
+
+class Frozen(Fault):
+    name = "frozen"
+
+    def wrong(self, k, states):
+        return states[-1 - k]
+
+
+class LostGuide(Fault):
+    name = "lost guide"
+
+    def fails(self, k):
+        return k < self.length
+
+
+KINDS = (NotFinite, LateCall, DelayedState, Jump, Frozen, LostGuide)
+
+
+class FailingController:
+    """A controller that loses its way."""
+
+    def __init__(self, controller, rng):
+        self.controller, self.fails = controller, False
+        self.way = rng.integers(4)
+
+    def torque(self, t, q, v):
+        tau = self.controller.torque(t, q, v)
+        if not self.fails:
+            return tau
+        if self.way == 0:
+            raise densarm.DensarmError("no way")
+        return {1: np.nan * tau, 2: 1e6 * np.ones_like(tau), 3: tau[:-1]}[self.way]
+
+
+class Course:
+    """A scenario's run, in which faults are injected."""
+
+    def __init__(self, name, model_error):
+        self.scenario = scenario = densarm.load_scenario(name)
+        self.clearance = densarm.Clearance(scenario.arm, scenario.scene)
+        self.plan = densarm.plan_motion(scenario, self.clearance, scenario.control.guide)
+        self.controller = densarm.make_controller(scenario, self.plan)
+        self.run = densarm.simulate(scenario)
+        if self.run.outcome != "reached":
+            raise SystemExit(f"{name}: {self.run.outcome}")
+        self.model = scenario.arm.model.copy()
+        for inertia in self.model.inertias:
+            inertia.mass *= 1.0 + model_error
+        self.data = self.model.createData()
+        bound = densarm.SweptBound(self.clearance, 0.0)
+        check = StoppingCheck(bound, StraightBrake(scenario.arm))
+        self.could_stop = check.check(self.run.q, self.run.v).holds
+
+    def inject(self, kind, seed):
+        """Return what came of one fault."""
+        rng = np.random.default_rng(seed)
+        arm, dt = self.scenario.arm, self.scenario.simulation.dt
+        at = int(rng.integers(LEAD + GAP[1], len(self.run.time) - 1))
+        for_good = bool(rng.random() < 0.25)
+        fault = kind(rng, arm, np.inf if for_good else 10.0 ** rng.uniform(0.0, 2.5))
+        inner = FailingController(self.controller, rng)
+        guarded = GuardedController(arm, inner, dt)
+        states = [(self.run.q[k], self.run.v[k]) for k in range(at - LEAD - GAP[1], at - LEAD + 1)]
+        case = Case(fault.name, bool(self.could_stop[at]), for_good)
+        rest, tau = 0, np.zeros(arm.nv)
+        for k in range(-LEAD, LONGEST):
+            inner.fails = k >= 0 and fault.fails(k)
+            if k < 0 or fault.is_called(k):
+                tau = guarded.torque((at + k) * dt, *self.seen(fault, k, states))
+                case.see(k * dt, tau, arm.limits.effort, guarded.status.word)
+            states.append(self.step(*states[-1], tau))
+            rest = rest + 1 if np.abs(states[-1][1]).max() < SLOW else 0
+            if not case.is_clear(self.clearance, states[-1][0]) or (k > 0 and rest > AT_REST):
+                break
+        case.rests = rest > 0
+        return case
+
+    def seen(self, fault, k, states):
+        return fault.state(k, states) if k >= 0 else states[-1]
+
+    def step(self, q, v, tau):
+        """As the plant of the run, its masses off by the model's error."""
+        dt = self.scenario.simulation.dt
+        v = v + dt * pin.aba(self.model, self.data, q, v, tau)
+        return pin.integrate(self.model, q, dt * v), v
+
+
+@dataclass
+class Case:
+    """One fault and what came of it."""
+
+    kind: str
+    could_stop: bool
+    for_good: bool
+    outside: int = 0
+    smallest: float = np.inf
+    word: str = "acting"
+    noticed: float = np.nan
+    rests: bool = False
+    checked: np.ndarray | None = None
+
+    def see(self, t, tau, limit, word):
+        self.outside += not (np.isfinite(tau).all() and (np.abs(tau) <= limit).all())
+        if self.word == "acting" and word != "acting":
+            self.word, self.noticed = str(word), t
+
+    def is_clear(self, clearance, q):
+        if self.checked is None or np.abs(q - self.checked).max() > 1e-5:
+            self.checked = q
+            self.smallest = min(self.smallest, float(clearance.distances(q).min()))
+        return self.smallest > 0.0
+
+    @property
+    def harm(self):
+        return self.could_stop and self.smallest <= 0.0
+
+
+def row(name, cases):
+    seen = [case.noticed for case in cases if case.word != "acting"]
+    return {
+        "what": name,
+        "faults": len(cases),
+        "outside": sum(case.outside > 0 for case in cases),
+        "could_stop": sum(case.could_stop for case in cases),
+        "contacts": sum(case.smallest <= 0.0 for case in cases),
+        "harm": sum(case.harm for case in cases),
+        "harm_for_good": sum(case.harm and case.for_good for case in cases),
+        "noticed": len(seen),
+        "noticed_ms": 1e3 * float(np.median(seen)) if seen else None,
+        "moving": sum(not case.rests for case in cases),
+        "nearest_mm": 1e3 * min(case.smallest for case in cases),
+    }
+
+
+def table(rows):
+    print("".join(f"{key:>{30 if key == 'what' else 14}}" for key in rows[0]))
+    for r in rows:
+        texts = [f"{x:.3g}" if isinstance(x, float) else str(x) for x in r.values()]
+        print(f"{texts[0]:>30}" + "".join(f"{text:>14}" for text in texts[1:]))
+
+
+def arguments():
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--faults", type=int, default=1000, metavar="N")
+    parser.add_argument("--scenarios", nargs="+", default=SCENARIOS, help="names or TOML files")
+    parser.add_argument("--seed", type=int, default=0, help="of the first fault")
+    parser.add_argument("--model-error", type=float, default=0.0, help="share of the masses")
+    parser.add_argument("--json", metavar="FILE")
+    return parser.parse_args()
+
+
+def main():
+    args = arguments()
+    courses = {Path(name).stem: Course(name, args.model_error) for name in args.scenarios}
+    cases, began = {}, time.perf_counter()
+    pairs = islice(cycle(product(courses, KINDS)), args.faults)
+    for seed, (name, kind) in enumerate(pairs, start=args.seed):
+        case = courses[name].inject(kind, seed)
+        if case.harm or case.outside:
+            print(f"harm: {name}, {kind.__name__}, seed {seed}: {case}")
+        cases.setdefault(f"{name}, {kind.name}", []).append(case)
+    rows = [row(name, found) for name, found in cases.items()]
+    rows.append(row("all", [case for found in cases.values() for case in found]))
+    print(f"{args.faults} faults in {time.perf_counter() - began:.0f} s")
+    table(rows)
+    if args.json:
+        Path(args.json).write_text(json.dumps({"rows": rows}, indent=2), encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()
