@@ -170,8 +170,8 @@ class GuardedController:
             return None
         if _is_plausible(q, v, _FARTHEST, self._fastest):
             return q, v
-        why = f"At t = {t} s the state is beyond reason: velocity {v}, configuration {q}."
-        self._stop(GuardWord.NOT_A_STATE, _one_line(why))
+        largest = f"velocities up to {np.abs(v).max():.3g}, positions up to {np.abs(q).max():.3g}"
+        self._stop(GuardWord.NOT_A_STATE, f"At t = {t} s the state is beyond reason: {largest}.")
         return None
 
     def _observe(self, t: float, measured: Measured | None, dt: float) -> None:
@@ -226,8 +226,8 @@ class GuardedController:
         limit = self._arm.limits.effort
         if tau.shape == limit.shape and _takes(tau, limit, self._tau):
             return True
-        why = f"At t = {t:.6g} s the controller gave the torque {tau}, limits are {limit}."
-        self._stop(GuardWord.NO_TORQUE, _one_line(why))
+        why = f"{_one_line(tau)}, and the limits are {_one_line(limit)}"
+        self._stop(GuardWord.NO_TORQUE, f"At t = {t:.6g} s the controller gave {why}.")
         return False
 
     def _brake_or_hold(self, dt: float) -> None:
