@@ -18,6 +18,9 @@ if TYPE_CHECKING:
     from densarm.control.field_regulation import FieldRegulation
     from densarm.control.field_velocity import FieldVelocity
     from densarm.control.gains import Gains
+    from densarm.control.guard_status import GuardStatus, GuardWord
+    from densarm.control.guard_tolerances import GuardTolerances
+    from densarm.control.guarded_controller import GuardedController
     from densarm.control.velocity_controller import VelocityController
     from densarm.density.gauge import Gauge
     from densarm.density.goal_distance import EuclideanDistance, ProductDistance, TorusDistance
@@ -96,6 +99,10 @@ __all__ = [
     "Freedom",
     "Gains",
     "Gauge",
+    "GuardStatus",
+    "GuardTolerances",
+    "GuardWord",
+    "GuardedController",
     "Guide",
     "GuideKind",
     "GuidePath",
@@ -160,6 +167,9 @@ _NAMES = {
     "control.field_regulation": ("FieldRegulation",),
     "control.field_velocity": ("FieldVelocity",),
     "control.gains": ("Gains",),
+    "control.guard_status": ("GuardStatus", "GuardWord"),
+    "control.guard_tolerances": ("GuardTolerances",),
+    "control.guarded_controller": ("GuardedController",),
     "control.velocity_controller": ("VelocityController",),
     "density.gauge": ("Gauge",),
     "density.goal_distance": ("EuclideanDistance", "ProductDistance", "TorusDistance"),

@@ -21,6 +21,7 @@ def main() -> None:
     if isinstance(plan, densarm.NoPath):
         raise SystemExit(plan.reason)
     controller = densarm.make_controller(scenario, plan)
+    controller = densarm.GuardedController(arm, controller, period=DT)
 
     data = arm.model.createData()
     q, v = scenario.start, np.zeros(arm.nv)  # [rad], [rad/s]
@@ -31,6 +32,7 @@ def main() -> None:
         q, v = pin.integrate(arm.model, q, v * DT), v + a * DT
         smallest = min(smallest, clearance.distances(q).min())
 
+    print(controller.status.sentence)
     error = np.abs(arm.difference(scenario.goal, q)).max()
     print(f"{error:.1e} rad from the goal, clearance at least {smallest * 1e3:.1f} mm")
 

@@ -36,7 +36,9 @@ def test_panda_table(monkeypatch, tmp_path, capsys):
 def test_own_control_loop(monkeypatch, tmp_path, capsys):
     monkeypatch.chdir(tmp_path)
     run_example(monkeypatch, "own_control_loop.py")
-    words = capsys.readouterr().out.split()
+    status, result = capsys.readouterr().out.splitlines()
+    words = result.split()
+    assert status == "The controller acts."
     assert float(words[0]) < 0.01  # [rad] from the goal
     assert float(words[-2]) > 0.0  # [mm] of clearance
     assert list(tmp_path.iterdir()) == []
