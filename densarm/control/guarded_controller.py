@@ -149,8 +149,9 @@ class GuardedController:
         except (TypeError, ValueError, OverflowError):
             now = math.nan
         last, dt = self._time, self._period
-        self._time = now if math.isfinite(now) else last
+        self._time = now
         if not math.isfinite(now):
+            self._time = None if last is None else last + dt
             self._stop(GuardWord.CLOCK, f"The time {t!r} is not a finite number.")
         elif last is not None and now < last:
             self._stop(GuardWord.CLOCK, f"The time ran back from {last:.6g} s to {now:.6g} s.")
@@ -197,14 +198,9 @@ class GuardedController:
 
     def _doubt(self, t: float, q: Array, v: Array, dt: float, repeats: bool) -> None:
         """Brake; believe an unexplained state only once it has agreed with itself for long."""
-        off = self._arm.difference(self._observer.q, q), v - self._observer.v
-        where = f"{np.abs(off[0]).max():.3g} rad or m and {np.abs(off[1]).max():.3g} per s"
-        if repeats:
-            why = f"At t = {t:.6g} s the configuration stands still, and should be off by {where}."
-            self._stop(GuardWord.FROZEN, why)
-        else:
-            why = f"At t = {t:.6g} s the state is {where} from where the dynamics put it."
-            self._stop(GuardWord.JUMPED, why)
+        if self._status.word == GuardWord.ACTING:
+            word = GuardWord.FROZEN if repeats else GuardWord.JUMPED
+            self._stop(word, self._doubt_in_words(t, q, v, repeats))
         if self._agreed_for is not None and not repeats:
             self._candidate.advance(dt, self._period, self._tau)
             if self._candidate.agrees(q, v, dt):
@@ -214,6 +210,14 @@ class GuardedController:
                 return
         self._candidate.start(q, v)
         self._agreed_for = 0.0
+
+    def _doubt_in_words(self, t: float, q: Array, v: Array, repeats: bool) -> str:
+        position = np.abs(self._arm.difference(self._observer.q, q)).max()
+        velocity = np.abs(v - self._observer.v).max()
+        off = f"{position:.3g} in position and {velocity:.3g} in velocity (rad, m and s)"
+        if repeats:
+            return f"At t = {t} s the configuration has stood still, and is off by {off}."
+        return f"At t = {t} s the state is off by {off} from where the dynamics put it."
 
     def _passes_on(self, t: float, q: Array, v: Array) -> bool:
         """Take the controller's torque over if it may be applied."""
