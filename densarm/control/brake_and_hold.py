@@ -34,7 +34,7 @@ class BrakeAndHold:
     def __init__(self, arm: Arm, gains: Gains, period: float) -> None:
         self._arm = arm
         self._gains = gains
-        self._period = period
+        self._period = self._shortest = period
         self._dynamics = InverseDynamics(arm, _ACCELERATION_SHARE * arm.limits.acceleration)
         self._brake = StraightBrake(arm, _ACCELERATION_SHARE)
         self._time_left = math.nan
@@ -45,9 +45,16 @@ class BrakeAndHold:
         """Whether the arm has come to rest since the last `begin`."""
         return self._rest is not None
 
-    def begin(self, q: Array, v: Array) -> None:
-        """Begin to brake at a state, q (nq,) and v (nv,) [rad/s or m/s]."""
+    def begin(self, q: Array, v: Array, is_gentle: bool = False) -> None:
+        """Begin to brake.
+
+        Args:
+            q: configuration (nq,).
+            v: velocity (nv,) [rad/s or m/s].
+            is_gentle: whether to end the brake as -K_v q̇, which a delayed state leaves stable.
+        """
         self._time_left = self._brake.duration(q, v)
+        self._shortest = 1.0 / self._gains.velocity if is_gentle else self._period
         self._rest = None
 
     def torque(self, q: Array, v: Array, dt: float) -> Array:
@@ -66,4 +73,4 @@ class BrakeAndHold:
             error = self._arm.difference(self._rest, q)
             return self._dynamics.torque(-self._gains.velocity * v, -self._gains.position * error)
         longest = self._time_left if math.isfinite(self._time_left) else 0.0
-        return self._dynamics.torque(-v / max(longest, self._period), np.zeros_like(v))
+        return self._dynamics.torque(-v / max(longest, self._shortest), np.zeros_like(v))

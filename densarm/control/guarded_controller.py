@@ -54,7 +54,8 @@ class GuardedController:
         controller: acts while all is well.
         period: time between two calls [s].
         tolerances: what counts as normal.
-        gains: hold the arm at rest.
+        gains: hold the arm at rest; higher ones sag less under a payload that the model does not
+            know, and bear less delay.
 
     Raises:
         InvalidValueError: a period that is not positive.
@@ -83,7 +84,8 @@ class GuardedController:
         self._time: float | None = None
         self._longest_gap = max(self._tolerances.gap, 1.5 * period)
         self._last_q = np.full(arm.nq, np.nan)  # as measured
-        self._knows_state = self._trusts_state = self._brakes_anew = False
+        self._knows_state = self._trusts_state = False
+        self._brakes_anew = self._has_braked = False
         self._state = self._observer.q, self._observer.v
 
     @property
@@ -124,6 +126,7 @@ class GuardedController:
             return False
         self._controller = controller or self._controller
         self._status = GuardStatus()
+        self._has_braked = False
         self._time = None
         return True
 
@@ -239,8 +242,8 @@ class GuardedController:
             self._tau[:] = 0.0
             return
         if self._brakes_anew:
-            self._brake.begin(*self._state)
-            self._brakes_anew, dt = False, 0.0
+            self._brake.begin(*self._state, is_gentle=self._has_braked)
+            self._brakes_anew, self._has_braked, dt = False, True, 0.0
         tau = self._brake.torque(*self._state, dt)
         if not _takes(tau, self._arm.limits.effort, self._tau):
             self._tau[:] = 0.0
