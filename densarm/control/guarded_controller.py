@@ -191,8 +191,9 @@ class GuardedController:
             self._trusts_state, self._agreed_for = True, None
         else:
             self._doubt(t, *measured, dt, repeats)
-        trusted = measured is not None and self._trusts_state
-        self._state = measured if trusted else (self._observer.q, self._observer.v)
+        self._state = self._observer.q, self._observer.v
+        if measured is not None and self._trusts_state:
+            self._state = measured
 
     def _believe(self, q: Array, v: Array) -> None:
         self._observer.start(q, v)
