@@ -22,7 +22,7 @@ from tampering import KINDS, NotPossibleError
 import densarm
 from densarm.cli.json_file import write_json
 
-_ATTEMPTS = 20  # to find a run that can be made to fail in a given way
+_ATTEMPTS = 60  # to find a run that can be made to fail in a given way
 
 
 @dataclass

@@ -13,7 +13,7 @@ KINDS = {
     "sample skipped": Kind("replay", record.skipped_sample),
     "sample repeated": Kind("replay", record.repeated_sample),
     "teleport": Kind("replay", record.teleport),
-    "joints swapped": Kind("start", record.swapped_joints),
+    "joints swapped": Kind("replay", record.swapped_joints),
     "one time stamp changed": Kind("start", record.time_stamp),
     "time scaled": Kind("start", record.time_scale),
     "another time step": Kind("replay", claim.time_step),
