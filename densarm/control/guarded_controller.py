@@ -85,7 +85,7 @@ class GuardedController:
         self._longest_gap = max(self._tolerances.gap, 1.5 * period)
         self._last_q = np.full(arm.nq, np.nan)  # as measured
         self._knows_state = self._trusts_state = False
-        self._brakes_anew = self._has_braked = False
+        self._brakes_anew = self._has_rested = False
         self._state = self._observer.q, self._observer.v
 
     @property
@@ -126,7 +126,7 @@ class GuardedController:
             return False
         self._controller = controller or self._controller
         self._status = GuardStatus()
-        self._has_braked = False
+        self._has_rested = False
         self._time = None
         return True
 
@@ -243,9 +243,10 @@ class GuardedController:
             self._tau[:] = 0.0
             return
         if self._brakes_anew:
-            self._brake.begin(*self._state, is_gentle=self._has_braked)
-            self._brakes_anew, self._has_braked, dt = False, True, 0.0
+            self._brake.begin(*self._state, is_gentle=self._has_rested)
+            self._brakes_anew, dt = False, 0.0
         tau = self._brake.torque(*self._state, dt)
+        self._has_rested |= self._brake.is_holding
         if not _takes(tau, self._arm.limits.effort, self._tau):
             self._tau[:] = 0.0
 
