@@ -6,6 +6,8 @@ import numpy as np
 
 import densarm
 from densarm.certificates import swept_result
+from densarm.clearance import Clearance
+from densarm.swept_bound import SweptBound
 from densarm.swept_check import SweptVerdict
 
 GANTRY = Path(__file__).parent / "data" / "gantry.urdf"
@@ -42,7 +44,8 @@ def test_gantry_lifts_its_tool_over_a_wall():
     over = np.abs(run.q[:, 0]) < 0.05
     assert (run.q[over, 2] < 0.2).all()
     through = np.linspace(run.scenario.start, run.scenario.goal, 2)
-    result = swept_result(run.scenario, through, np.zeros_like(through))
+    bound = SweptBound(Clearance(arm, run.scenario.scene))
+    result = swept_result(bound, through, np.zeros_like(through), 1.0)
     assert result.verdict == SweptVerdict.CONTACT
 
 

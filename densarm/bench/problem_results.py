@@ -137,7 +137,7 @@ def run_problems(
         InvalidValueError: a number of processes below one.
     """
     results = []
-    run = partial(run_problem, options=options or RunOptions())
+    run = partial(run_problem, options=options)
     for result in _results(run, problems, positive_integer("jobs", jobs)):
         results.append(result)
         on_progress(f"{len(results)} of {len(problems)} problems run")
@@ -160,10 +160,10 @@ def _results(
         pool.shutdown(cancel_futures=True)
 
 
-def run_problem(problem: Problem, options: RunOptions) -> ProblemResult:
+def run_problem(problem: Problem, options: RunOptions | None = None) -> ProblemResult:
     """Plan a problem, run its closed loop and prove it; an error becomes a result."""
     try:
-        run = _run(problem, options)
+        run = _run(problem, options or RunOptions())
         return ProblemResult(
             problem.scene_name,
             problem.index,

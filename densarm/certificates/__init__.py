@@ -1,6 +1,6 @@
 """Certificates: what is proved about a recorded run."""
 
-from densarm.certificates.certificate import Certificate, Check, certify
+from densarm.certificates.certificate import Certificate, Check, certify, swept_result
 from densarm.certificates.energy import EnergyRecord, EnergyVerdict, record_energy
 from densarm.certificates.rantzer import RantzerRecord, record_rantzer
 from densarm.certificates.replay import replay_errors
@@ -15,4 +15,5 @@ __all__ = [
     "record_energy",
     "record_rantzer",
     "replay_errors",
+    "swept_result",
 ]

@@ -73,13 +73,18 @@ def certify(scenario: Scenario, time: Array, q: Array, v: Array, tau: Array) -> 
     )
 
 
-def _swept_result(scenario: Scenario, bound: SweptBound, q: Array, v: Array) -> SweptResult:
+def swept_result(bound: SweptBound, q: Array, v: Array, dt: float) -> SweptResult:
     """Return the swept check of a recorded motion.
 
     Between samples the true motion departs from the chord by at most a Δt²/8, a the largest
     acceleration of the step and its neighbours.
+
+    Args:
+        bound: the pairs and the margin.
+        q: configurations (N, nq).
+        v: velocities (N, nv) [rad/s or m/s].
+        dt: time between samples [s].
     """
-    dt = scenario.simulation.dt
     acceleration = np.abs(np.diff(v, axis=0)) / dt
     around = np.maximum(
         acceleration,
@@ -92,7 +97,7 @@ def _swept_result(scenario: Scenario, bound: SweptBound, q: Array, v: Array) -> 
 
 
 def _swept(scenario: Scenario, bound: SweptBound, q: Array, v: Array) -> Check:
-    result = _swept_result(scenario, bound, q, v)
+    result = swept_result(bound, q, v, scenario.simulation.dt)
     at = result.index * scenario.simulation.dt
     if result.verdict != SweptVerdict.CLEAR:
         pairs = ", ".join(f"{a}-{b}" for a, b in result.pairs[:3])

@@ -29,13 +29,7 @@ from densarm.outcome import Outcome
 from densarm.reference.smooth_path import smooth_path
 from densarm.reference.timing import time_path
 from densarm.reference.timing_parameters import TimingParameters
-from densarm.simulation import (
-    FixedStepLoop,
-    LoopEnd,
-    PinocchioPlant,
-    Recording,
-    SimulationParameters,
-)
+from densarm.simulation import LoopEnd, Recording
 from densarm.simulation.proportion import Proportion
 from densarm.swept_bound import SweptBound
 from densarm.swept_check import SweptVerdict
@@ -113,21 +107,21 @@ def run_by_torque(unsafe: UnsafeSet, path: Array) -> Recording:
     """Track the timed planning system's curve, joint positions (M, 2), by [ZNV] eq. 17."""
     configurations = arm.configurations(path)
     length = float(np.linalg.norm(np.diff(path, axis=0), axis=1).sum())
-    simulation = SimulationParameters(stall_time=30.0)  # the law decays at K_p/K_v = 0.1/s
+    simulation = densarm.SimulationParameters(stall_time=30.0)  # the law decays at K_p/K_v = 0.1/s
     smooth = smooth_path(bound, configurations)
     assert smooth is not None
     reference = time_path(arm, smooth, length, simulation.control_period, TimingParameters())
     density = NavigationDensity([unsafe], sum_distance(inertia_weights))
     controller = DensityTracking(arm, density, reference, GAINS)
-    plant = PinocchioPlant(arm, simulation.dt, simulation.integrator)
-    return FixedStepLoop(arm, plant, simulation).run(
+    plant = densarm.PinocchioPlant(arm, simulation.dt, simulation.integrator)
+    return densarm.FixedStepLoop(arm, plant, simulation).run(
         controller, configurations[0], goal, not_before=reference.duration
     )
 
 
 def is_proved_clear(run: Recording) -> bool:
     """Whether the swept check proves that nothing was touched between samples either."""
-    return swept_result(scenario, run.q, run.v).verdict == SweptVerdict.CLEAR
+    return swept_result(bound, run.q, run.v, run.time[1]).verdict == SweptVerdict.CLEAR
 
 
 def draw_motion(ax: Axes, run: Recording) -> None:

@@ -14,7 +14,7 @@ from densarm.reference.smooth_path import smooth_path
 from densarm.reference.timing import time_path
 from densarm.scenario import load_scenario
 from densarm.scene import Scene, Sphere
-from densarm.simulation import FixedStepLoop
+from densarm.simulation import FixedStepLoop, PinocchioPlant
 from densarm.stopping_check import StoppingCheck
 from densarm.straight_brake import StraightBrake
 from densarm.swept_bound import SweptBound
@@ -35,9 +35,10 @@ def failing(scenario, stopping):
     path = smooth_path(SweptBound(Clearance(arm, Scene())), corners)
     reference = time_path(arm, path, 4.8, 0.001, TimingParameters(), stopping)
     controller = ComputedTorque(arm, reference, Gains())
-    loop = FixedStepLoop(arm, scenario.simulation)
+    p = scenario.simulation
+    loop = FixedStepLoop(arm, PinocchioPlant(arm, p.dt, p.integrator), p)
     run = loop.run(controller, scenario.start, scenario.goal, not_before=reference.duration)
-    certificate = certify(scenario, run.time, run.q, run.v, run.tau)
+    certificate = certify(scenario, run.time, run.q, run.v, run.u)
     return {check.name: check for check in certificate.checks if not check.holds}
 
 

@@ -86,7 +86,8 @@ def test_a_method_given_twice_runs_once(swing_up):
 
 def test_progress_names_method_and_start(swing_up):
     told = []
-    compare(swing_up, ["potential_field"], 1, tuning_starts=1, on_progress=told.append)
+    short = replace(swing_up, simulation=replace(swing_up.simulation, time_limit=0.2))
+    compare(short, ["potential_field"], 1, tuning_starts=1, on_progress=told.append)
     tuning = ["potential_field from tuning start 1 of 1"] * len(SCALES)
     assert told == [*tuning, "potential_field from start 1 of 1"]
 
