@@ -1,3 +1,4 @@
+import re
 import runpy
 from pathlib import Path
 
@@ -11,9 +12,14 @@ def run_example(monkeypatch: pytest.MonkeyPatch, name: str, *arguments: str) -> 
     runpy.run_path(str(EXAMPLES / name), run_name="__main__")
 
 
-def test_every_example_is_tested():
-    names = {path.name for path in EXAMPLES.glob("*.py")}
-    assert names == {"swing_up.py", "panda_table.py", "own_control_loop.py", "free_body.py"}
+def test_every_example_is_tested_short_and_listed():
+    course = (EXAMPLES / "README.md").read_text(encoding="utf-8")
+    for path in EXAMPLES.glob("*.py"):
+        assert f"test_{path.stem}" in globals()
+        assert len(path.read_text(encoding="utf-8").splitlines()) < 60
+        assert f"]({path.name})" in course
+    for link in re.findall(r"\]\((.+?)\)", course):
+        assert (EXAMPLES / link).is_file()
 
 
 def test_swing_up(monkeypatch, tmp_path, capsys):
@@ -22,7 +28,6 @@ def test_swing_up(monkeypatch, tmp_path, capsys):
     assert "reached the goal" in out
     assert "not proved" not in out
     assert {path.name for path in tmp_path.iterdir()} == {"swing_up.npz", "swing_up.html"}
-    assert len((EXAMPLES / "swing_up.py").read_text(encoding="utf-8").splitlines()) < 40
 
 
 def test_panda_table(monkeypatch, tmp_path, capsys):
@@ -51,4 +56,34 @@ def test_free_body(monkeypatch, tmp_path, capsys):
     assert "clear\n" in out
     assert "certified: True" in out
     assert {path.name for path in tmp_path.iterdir()} == {"free_body.html"}
-    assert len((EXAMPLES / "free_body.py").read_text(encoding="utf-8").splitlines()) < 60
+
+
+def test_own_urdf(monkeypatch, tmp_path, capsys):
+    run_example(monkeypatch, "own_urdf.py", "--out", str(tmp_path))
+    out = capsys.readouterr().out
+    assert "slide from -0.2 to 0.1\n" in out
+    assert "reached" in out
+    assert "certified: True" in out
+    assert float(out.split()[-2]) > -190.0  # [mm], where start and goal have the quill
+    assert {path.name for path in tmp_path.iterdir()} == {"own_urdf.png"}
+
+
+def test_own_scene(monkeypatch, tmp_path, capsys):
+    run_example(monkeypatch, "own_scene.py", "--out", str(tmp_path))
+    out = capsys.readouterr().out
+    assert "reached" in out
+    assert "certified: True" in out
+    assert float(out.split()[-2]) > 0.0  # [mm] of clearance
+    assert {path.name for path in tmp_path.iterdir()} == {"own_scene.png"}
+
+
+def test_reading_a_run(monkeypatch, tmp_path, capsys, swing_up_run):
+    swing_up_run.save(tmp_path / "run.npz")
+    run_example(monkeypatch, "reading_a_run.py", str(tmp_path / "run.npz"), "--out", str(tmp_path))
+    out = capsys.readouterr().out
+    assert "reached" in out
+    assert out.count(" proved: ") == 6
+    assert "not proved" not in out
+    assert f"{swing_up_run.clearance[0] * 1e3:.1f} mm" in out
+    pictures = {"reading_a_run.png", "reading_a_run_plot.png"}
+    assert {path.name for path in tmp_path.iterdir()} == {"run.npz", *pictures}
