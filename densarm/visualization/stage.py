@@ -85,7 +85,7 @@ class Stage:
         return [pin.SE3(pose) for pose in self._data.oMi]
 
     def _end_effector(self, q: Array) -> Array:
-        frame = self._model.frames[self._model.getFrameId(self.run.scenario.arm.end_effector)]
+        frame = self._model.frames[self.run.scenario.arm.end_effector_frame]
         pose = self.joint_poses(q)[frame.parentJoint] * frame.placement
         return np.array(pose.translation)
 

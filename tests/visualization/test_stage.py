@@ -3,6 +3,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from densarm.arm import load_arm
 from densarm.scene import HalfSpace, Scene
 from densarm.visualization.stage import Stage
 
@@ -74,3 +75,13 @@ def test_camera_does_not_step_back_for_a_half_space(resting):
     ]
     np.testing.assert_array_equal(cameras[0].offset, cameras[1].offset)
     np.testing.assert_array_equal(cameras[0].target, cameras[1].target)
+
+
+def test_end_effector_may_share_its_name_with_a_joint(resting):
+    arm = load_arm("z1")
+    scenario = replace(
+        resting.scenario, arm=arm, start=arm.postures["ready"], goal=arm.postures["ready"]
+    )
+    row = np.zeros((1, arm.nv))
+    run = replace(resting, scenario=scenario, q=arm.postures["ready"][np.newaxis], v=row, tau=row)
+    assert Stage(run).path is None
