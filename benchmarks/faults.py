@@ -19,8 +19,8 @@ import pinocchio as pin
 
 import densarm
 from densarm.control.guarded_controller import GuardedController
-from densarm.stopping_check import StoppingCheck
-from densarm.straight_brake import StraightBrake
+from densarm.proof.stopping_check import StoppingCheck
+from densarm.proof.straight_brake import StraightBrake
 
 SCENARIOS = ("panda_table", "ur5_bin", "swing_up")
 LEAD = 50  # samples of the run before the fault

@@ -46,10 +46,12 @@ if TYPE_CHECKING:
     from densarm.motion_plan import MotionPlan, plan_motion
     from densarm.obstacles import Box, Capsule, Cylinder, HalfSpace, Sphere
     from densarm.outcome import Outcome
+    from densarm.proof.swept_bound import SweptBound
+    from densarm.proof.swept_check import SweptCheck
     from densarm.reference.reference import Reference
     from densarm.reference.timing_parameters import TimingParameters
     from densarm.rigid_body import Freedom, free_body
-    from densarm.robot_description import RobotDescription
+    from densarm.robot.robot_description import RobotDescription
     from densarm.scenario import (
         ControlForm,
         ControlParameters,
@@ -62,8 +64,6 @@ if TYPE_CHECKING:
     from densarm.simulation.fixed_step_loop import FixedStepLoop, SimulationParameters
     from densarm.simulation.plant import Integrator, PinocchioPlant
     from densarm.simulation.single_integrator import SingleIntegrator
-    from densarm.swept_bound import SweptBound
-    from densarm.swept_check import SweptCheck
     from densarm.trajectory import Trajectory
     from densarm.visualization.picture_file import save_animation, save_picture
     from densarm.visualization.plots import save_plot
@@ -194,7 +194,7 @@ _NAMES = {
     "outcome": ("Outcome",),
     "reference.reference": ("Reference",),
     "reference.timing_parameters": ("TimingParameters",),
-    "robot_description": ("RobotDescription",),
+    "robot.robot_description": ("RobotDescription",),
     "scenario": ("ControlForm", "ControlParameters", "GuideKind", "Scenario", "load_scenario"),
     "scene": ("Scene",),
     "scene_files": ("MotionProblem", "load_problems", "load_scene"),
@@ -202,8 +202,8 @@ _NAMES = {
     "simulation.fixed_step_loop": ("FixedStepLoop", "SimulationParameters"),
     "simulation.plant": ("Integrator", "PinocchioPlant"),
     "simulation.single_integrator": ("SingleIntegrator",),
-    "swept_bound": ("SweptBound",),
-    "swept_check": ("SweptCheck",),
+    "proof.swept_bound": ("SweptBound",),
+    "proof.swept_check": ("SweptCheck",),
     "trajectory": ("Trajectory",),
     "visualization.picture_file": ("save_animation", "save_picture"),
     "visualization.plots": ("save_plot",),

@@ -13,13 +13,13 @@ from numpy.typing import ArrayLike, NDArray
 from densarm.arrays import Array
 from densarm.attachment import Attachment
 from densarm.catalogue import robot_description, robot_names
-from densarm.cut_subtrees import without_subtrees
 from densarm.errors import InvalidValueError, UnknownNameError
-from densarm.joint_limits import JointLimits, joint_limits
-from densarm.joint_selection import only_joints, without_joints
-from densarm.robot_description import RobotDescription, read_text
-from densarm.robot_models import build_models, build_visual_model, end_effector_frame
-from densarm.self_collision import ExcludedPair, srdf_postures
+from densarm.robot.cut_subtrees import without_subtrees
+from densarm.robot.joint_limits import JointLimits, joint_limits
+from densarm.robot.joint_selection import only_joints, without_joints
+from densarm.robot.robot_description import RobotDescription, read_text
+from densarm.robot.robot_models import build_models, build_visual_model, end_effector_frame
+from densarm.robot.self_collision import ExcludedPair, srdf_postures
 from densarm.validation import finite_vector
 
 __all__ = ["Arm", "JointLimits", "load_arm"]

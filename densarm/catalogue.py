@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from densarm.errors import FileContentError, UnknownNameError
-from densarm.robot_description import DATA_WHEEL, RobotDescription, read_text, resolve_path
+from densarm.robot.robot_description import DATA_WHEEL, RobotDescription, read_text, resolve_path
 
 
 def robots_folder() -> Path:

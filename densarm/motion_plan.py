@@ -12,13 +12,13 @@ from densarm.fields.sub_goal_chain import SubGoalChain
 from densarm.guides.direct import DirectGuide
 from densarm.guides.guide import Guide, GuidePath, NoPath
 from densarm.guides.path import PathGuide
+from densarm.proof.separating_planes import SeparatingPlanes
+from densarm.proof.stopping_check import StoppingCheck
+from densarm.proof.straight_brake import StraightBrake
+from densarm.proof.swept_bound import SweptBound
 from densarm.reference.reference import Reference
 from densarm.scenario import ControlForm, GuideKind, Scenario
-from densarm.separating_planes import SeparatingPlanes
 from densarm.simulation.fixed_step_loop import REACHED_POSITION
-from densarm.stopping_check import StoppingCheck
-from densarm.straight_brake import StraightBrake
-from densarm.swept_bound import SweptBound
 
 _LIMIT_INSET = 0.2 * REACHED_POSITION
 """Distance from position limits that the motion leaves and reaches its ends at [rad or m]."""

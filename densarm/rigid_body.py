@@ -11,7 +11,7 @@ import pinocchio as pin
 
 from densarm.arm import Arm
 from densarm.errors import InvalidValueError
-from densarm.robot_description import RobotDescription
+from densarm.robot.robot_description import RobotDescription
 from densarm.scene import Box, Capsule, Cylinder, Obstacle, Scene, Sphere, obstacle_pose
 from densarm.validation import finite_tuple, one_of, positive
 

@@ -25,7 +25,7 @@ from densarm.fields.speed_law import SpeedParameters
 from densarm.fields.sub_goal_chain import SensingParameters
 from densarm.guides.path import PathGuideParameters
 from densarm.reference.timing_parameters import TimingParameters
-from densarm.robot_description import RobotDescription
+from densarm.robot.robot_description import RobotDescription
 from densarm.scene import Scene
 from densarm.scene_files.scene_tables import parse_scene
 from densarm.simulation.fixed_step_loop import SimulationParameters

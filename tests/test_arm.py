@@ -20,7 +20,7 @@ from densarm.errors import (
     RobotDescriptionError,
     UnknownNameError,
 )
-from densarm.robot_description import RobotDescription, data_wheel_folder
+from densarm.robot.robot_description import RobotDescription, data_wheel_folder
 
 DATA = Path(__file__).parent / "data"
 BRANCHING = DATA / "branching.urdf"

@@ -8,8 +8,8 @@ from densarm.catalogue import scenario_paths
 from densarm.clearance import Clearance
 from densarm.closed_loop import simulate
 from densarm.outcome import Outcome
+from densarm.proof.swept_bound import SweptBound
 from densarm.scenario import ControlForm, GuideKind, Scenario, load_scenario
-from densarm.swept_bound import SweptBound
 
 loaded = cache(load_scenario)
 

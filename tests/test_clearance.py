@@ -12,7 +12,7 @@ from densarm.arm import Arm, load_arm
 from densarm.clearance import Clearance
 from densarm.distance_view import DistanceView
 from densarm.errors import InvalidValueError
-from densarm.robot_description import RobotDescription
+from densarm.robot.robot_description import RobotDescription
 from densarm.scene import Box, Capsule, Cylinder, HalfSpace, Scene, Sphere
 
 DATA = Path(__file__).parent / "data"

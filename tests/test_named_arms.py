@@ -12,8 +12,8 @@ from densarm.bench.problem_results import run_problem
 from densarm.catalogue import robot_names
 from densarm.clearance import Clearance
 from densarm.outcome import Outcome
+from densarm.robot.self_collision import Exclusion
 from densarm.scene import Scene
-from densarm.self_collision import Exclusion
 
 loaded = cache(load_arm)
 

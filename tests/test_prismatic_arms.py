@@ -7,8 +7,8 @@ import numpy as np
 import densarm
 from densarm.certificates import swept_result
 from densarm.clearance import Clearance
-from densarm.swept_bound import SweptBound
-from densarm.swept_check import SweptVerdict
+from densarm.proof.swept_bound import SweptBound
+from densarm.proof.swept_check import SweptVerdict
 
 GANTRY = Path(__file__).parent / "data" / "gantry.urdf"
 SLIDER = """<robot name="slider">

@@ -10,8 +10,8 @@ import densarm
 from densarm.density.euclidean_density import EuclideanDensity
 from densarm.density.implicit_function import Lowered, UnsafeRegion
 from densarm.errors import InvalidValueError
+from densarm.proof.swept_check import SweptCheck, SweptVerdict
 from densarm.simulation import FixedStepLoop, LoopEnd, SimulationParameters, SingleIntegrator
-from densarm.swept_check import SweptCheck, SweptVerdict
 
 SQUARE, CUBE = [(-2.0, 2.0)] * 2, [(-2.0, 2.0)] * 3
 POINT = densarm.Sphere(name="point", radius=1e-9)

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from densarm.arm import Arm
 from densarm.clearance import Clearance
 from densarm.errors import DensarmError
-from densarm.robot_description import RobotDescription
+from densarm.robot.robot_description import RobotDescription
 from densarm.scene import Scene, Sphere
 
 DATA = Path(__file__).parent / "data"

@@ -6,9 +6,9 @@ import numpy as np
 import pinocchio as pin
 
 from densarm import Box, Clearance, Cylinder, Scene, Sphere
-from densarm.stopping_check import StoppingCheck
-from densarm.straight_brake import StraightBrake
-from densarm.swept_bound import SweptBound
+from densarm.proof.stopping_check import StoppingCheck
+from densarm.proof.straight_brake import StraightBrake
+from densarm.proof.swept_bound import SweptBound
 from tampering.kind import NotPossibleError, exponent, regridded, with_scenario
 
 

@@ -7,12 +7,12 @@ import numpy as np
 from densarm.arrays import Array
 from densarm.certificates.replay import REPLAY_TOLERANCE, replay_errors
 from densarm.clearance import Clearance
+from densarm.proof.stopping_check import StoppingCheck
+from densarm.proof.straight_brake import StraightBrake
+from densarm.proof.swept_bound import SweptBound
+from densarm.proof.swept_check import SweptCheck, SweptResult, SweptVerdict
 from densarm.scenario import Scenario
 from densarm.simulation.fixed_step_loop import REACHED_POSITION, REACHED_VELOCITY
-from densarm.stopping_check import StoppingCheck
-from densarm.straight_brake import StraightBrake
-from densarm.swept_bound import SweptBound
-from densarm.swept_check import SweptCheck, SweptResult, SweptVerdict
 
 _ROUNDING = 1e-9  # [rad, rad/s, N·m], room for rounding in comparisons with limits
 _RESTS = 50  # ends of brakes at most whose distances are told

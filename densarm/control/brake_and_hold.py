@@ -8,7 +8,7 @@ from densarm.arm import Arm
 from densarm.arrays import Array
 from densarm.control.gains import Gains
 from densarm.control.inverse_dynamics import InverseDynamics
-from densarm.straight_brake import StraightBrake
+from densarm.proof.straight_brake import StraightBrake
 
 _REST = 1e-3  # [rad/s or m/s], below which the arm is held where it is
 _ACCELERATION_SHARE = 0.97  # asked for: a torque is held while the state changes

@@ -10,8 +10,8 @@ from densarm.control.controller import checked_state
 from densarm.control.gains import Gains
 from densarm.control.inverse_dynamics import InverseDynamics
 from densarm.density import NavigationDensity, TorusDistance
+from densarm.proof.straight_brake import HELD_SHARE
 from densarm.reference.reference import Reference
-from densarm.straight_brake import HELD_SHARE
 
 
 class DensityTracking:

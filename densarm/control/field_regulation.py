@@ -9,7 +9,7 @@ from densarm.control.gains import Gains
 from densarm.control.inverse_dynamics import InverseDynamics
 from densarm.control.stopping_guard import StoppingGuard
 from densarm.fields.velocity_field import VelocityField
-from densarm.straight_brake import HELD_SHARE
+from densarm.proof.straight_brake import HELD_SHARE
 
 
 class FieldRegulation:

@@ -9,7 +9,7 @@ from densarm.control.controller import Controller, checked_state
 from densarm.control.gains import Gains
 from densarm.control.inverse_dynamics import InverseDynamics
 from densarm.control.stopping_guard import brake_torque
-from densarm.straight_brake import HELD_SHARE, StraightBrake
+from densarm.proof.straight_brake import HELD_SHARE, StraightBrake
 
 _REST = 1e-3  # [rad/s or m/s], below which the arm is held where it is
 

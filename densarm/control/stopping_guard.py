@@ -7,7 +7,7 @@ from densarm.arm import Arm
 from densarm.arrays import Array
 from densarm.control.inverse_dynamics import InverseDynamics
 from densarm.fields.speed_law import SpeedLaw
-from densarm.straight_brake import StraightBrake
+from densarm.proof.straight_brake import StraightBrake
 
 
 class StoppingGuard:

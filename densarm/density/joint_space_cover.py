@@ -13,7 +13,7 @@ from densarm.density.inverse_bump import log_inverse_bump
 from densarm.density.joint_error import joint_error
 from densarm.density.unsafe_cells import unsafe_components
 from densarm.errors import InvalidValueError
-from densarm.swept_bound import SweptBound
+from densarm.proof.swept_bound import SweptBound
 from densarm.validation import positive, positive_integer
 
 

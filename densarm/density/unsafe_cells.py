@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from densarm.arm import Arm
 from densarm.arrays import Array
 from densarm.errors import InvalidValueError
-from densarm.swept_bound import SweptBound
+from densarm.proof.swept_bound import SweptBound
 from densarm.validation import positive_integer
 
 MAX_JOINTS = 3

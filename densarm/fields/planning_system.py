@@ -7,7 +7,7 @@ import numpy as np
 from densarm.arrays import Array
 from densarm.density import Gauge
 from densarm.fields.guided_density import GuidedDensity
-from densarm.swept_bound import SweptBound
+from densarm.proof.swept_bound import SweptBound
 
 
 @dataclass(frozen=True)

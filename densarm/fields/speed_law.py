@@ -8,8 +8,8 @@ import numpy as np
 from densarm.arrays import Array
 from densarm.compiled import compiled
 from densarm.errors import InvalidValueError
-from densarm.straight_brake import StraightBrake
-from densarm.swept_bound import SweptBound
+from densarm.proof.straight_brake import StraightBrake
+from densarm.proof.swept_bound import SweptBound
 
 _HALVINGS = 6  # of a speed from which no brake is within the limits
 

@@ -7,7 +7,7 @@ import numpy as np
 from densarm.arrays import Array
 from densarm.errors import InvalidValueError
 from densarm.guides.guide import GuidePath
-from densarm.swept_bound import SweptBound
+from densarm.proof.swept_bound import SweptBound
 from densarm.validation import positive
 
 _SURPLUS = 3.0

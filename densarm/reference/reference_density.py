@@ -10,8 +10,8 @@ from densarm.density import (
     TorusDistance,
 )
 from densarm.fields.sub_goal_chain import SensingParameters
+from densarm.proof.swept_bound import SweptBound
 from densarm.reference.reference import Reference
-from densarm.swept_bound import SweptBound
 
 _SAMPLES = 200  # of the reference, at which distances are computed
 _SMALLEST = 1e-6  # [m or rad], sensing distance where the reference leaves no room

@@ -4,8 +4,8 @@ import numpy as np
 from scipy.interpolate import BSpline
 
 from densarm.arrays import Array
-from densarm.swept_bound import SweptBound
-from densarm.swept_check import SweptCheck, SweptVerdict
+from densarm.proof.swept_bound import SweptBound
+from densarm.proof.swept_check import SweptCheck, SweptVerdict
 
 _DEGREE = 3
 _WIDEST = 0.8  # [rad] between control points at first

@@ -12,11 +12,11 @@ from numpy.typing import NDArray
 from densarm.arm import Arm
 from densarm.arrays import Array
 from densarm.holding_torque import holding_ratios, holding_torque
+from densarm.proof.stopping_check import StoppingCheck
 from densarm.reference.infeasible_timing import InfeasibleTimingError
 from densarm.reference.reference import Reference
 from densarm.reference.smooth_path import SmoothPath
 from densarm.reference.timing_parameters import TimingParameters
-from densarm.stopping_check import StoppingCheck
 
 _UNLIMITED = 1e4  # stands for an infinite limit, which TOPP-RA's solver does not take
 _GRID_STEP = 0.01  # [rad] between grid points

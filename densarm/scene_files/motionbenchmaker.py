@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from densarm.errors import DensarmError, FileContentError, InvalidValueError
-from densarm.robot_description import read_text
+from densarm.robot.robot_description import read_text
 from densarm.scene import Scene
 from densarm.validation import finite_number, finite_tuple, non_negative_integer
 

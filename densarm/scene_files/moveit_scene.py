@@ -6,7 +6,7 @@ import pinocchio as pin
 
 from densarm.errors import DensarmError, FileContentError, InvalidValueError
 from densarm.obstacles import Obstacle
-from densarm.robot_description import read_text
+from densarm.robot.robot_description import read_text
 from densarm.scene import Scene
 from densarm.scene_files.moveit_shapes import (
     moveit_mesh,

@@ -11,7 +11,7 @@ from densarm.attachment import Attachment
 from densarm.errors import DensarmError, FileContentError, InvalidValueError
 from densarm.mesh import Mesh
 from densarm.obstacles import Obstacle
-from densarm.robot_description import read_text
+from densarm.robot.robot_description import read_text
 from densarm.scene import Scene
 from densarm.scene_files.moveit_shapes import (
     moveit_mesh,

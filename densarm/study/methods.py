@@ -21,8 +21,8 @@ from densarm.fields.speed_law import SpeedLaw
 from densarm.fields.velocity_field import VelocityField
 from densarm.guides.guide import NoPath
 from densarm.motion_plan import plan_motion
+from densarm.proof.swept_bound import SweptBound
 from densarm.scenario import ControlForm, GuideKind, Scenario
-from densarm.swept_bound import SweptBound
 
 _NEAREST = 3  # pairs named where an arm rests
 _KAPPA = 100.0  # of the navigation function: at 10 and below it is stuck on every arm tried

@@ -26,13 +26,13 @@ from densarm.density.unsafe_set import UnsafeSet
 from densarm.fields.integral_curves import CurveParameters, IntegralCurves, integral_curves
 from densarm.fields.joint_space_field import JointSpaceField, SmallestClearance
 from densarm.outcome import Outcome
+from densarm.proof.swept_bound import SweptBound
+from densarm.proof.swept_check import SweptVerdict
 from densarm.reference.smooth_path import smooth_path
 from densarm.reference.timing import time_path
 from densarm.reference.timing_parameters import TimingParameters
 from densarm.simulation import LoopEnd, Recording
 from densarm.simulation.proportion import Proportion
-from densarm.swept_bound import SweptBound
-from densarm.swept_check import SweptVerdict
 from densarm.visualization import figure_style as style
 from densarm.visualization.figure_report import FigureReport, figure_arguments
 

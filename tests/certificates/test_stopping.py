@@ -9,15 +9,15 @@ from densarm.certificates import certify
 from densarm.clearance import Clearance
 from densarm.control.computed_torque import ComputedTorque
 from densarm.control.gains import Gains
+from densarm.proof.stopping_check import StoppingCheck
+from densarm.proof.straight_brake import StraightBrake
+from densarm.proof.swept_bound import SweptBound
 from densarm.reference import TimingParameters
 from densarm.reference.smooth_path import smooth_path
 from densarm.reference.timing import time_path
 from densarm.scenario import load_scenario
 from densarm.scene import Scene, Sphere
 from densarm.simulation import FixedStepLoop, PinocchioPlant
-from densarm.stopping_check import StoppingCheck
-from densarm.straight_brake import StraightBrake
-from densarm.swept_bound import SweptBound
 
 BALL = Sphere(name="ball", radius=0.1, position=(1.487, 0.0, 1.337))
 

@@ -7,8 +7,8 @@ import pytest
 
 import densarm
 from densarm.errors import InvalidValueError
+from densarm.proof.swept_check import SweptCheck, SweptVerdict
 from densarm.simulation import FixedStepLoop, LoopEnd, SingleIntegrator
-from densarm.swept_check import SweptCheck, SweptVerdict
 
 
 @pytest.fixture(scope="module")

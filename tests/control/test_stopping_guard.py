@@ -10,9 +10,9 @@ from densarm.clearance import Clearance
 from densarm.control.inverse_dynamics import InverseDynamics
 from densarm.control.stopping_guard import StoppingGuard
 from densarm.fields import SpeedLaw, SpeedParameters
+from densarm.proof.straight_brake import HELD_SHARE
+from densarm.proof.swept_bound import SweptBound
 from densarm.scene import Scene, Sphere
-from densarm.straight_brake import HELD_SHARE
-from densarm.swept_bound import SweptBound
 
 ARM = load_arm("two_link")
 BALLS = [

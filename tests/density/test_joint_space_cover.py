@@ -7,7 +7,7 @@ import densarm
 from densarm.density.joint_space_cover import CoverParameters, JointSpaceCover
 from densarm.density.unsafe_cells import unsafe_components
 from densarm.errors import InvalidValueError
-from densarm.swept_bound import SweptBound
+from densarm.proof.swept_bound import SweptBound
 
 SCENARIO = densarm.load_scenario("swing_up")
 ARM = SCENARIO.arm

@@ -4,7 +4,7 @@ import pytest
 import densarm
 from densarm.density.unsafe_cells import unsafe_components
 from densarm.errors import InvalidValueError
-from densarm.swept_bound import SweptBound
+from densarm.proof.swept_bound import SweptBound
 
 
 def bound_among(*centres: tuple[float, float], margin: float = 0.0) -> SweptBound:

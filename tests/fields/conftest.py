@@ -8,8 +8,8 @@ from densarm.clearance import Clearance
 from densarm.density import DensityParameters
 from densarm.fields import GuidedDensity, SensingParameters, SubGoalChain
 from densarm.guides import DirectGuide, PathGuide
+from densarm.proof.swept_bound import SweptBound
 from densarm.scenario import load_scenario
-from densarm.swept_bound import SweptBound
 
 
 @pytest.fixture(scope="session")

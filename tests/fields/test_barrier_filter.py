@@ -12,8 +12,8 @@ from densarm.errors import InvalidValueError
 from densarm.fields import SpeedLaw, SpeedParameters
 from densarm.fields.barrier_filter import BarrierFilter, BarrierParameters
 from densarm.fields.barriers import Barriers
+from densarm.proof.swept_bound import SweptBound
 from densarm.scene import Scene, Sphere
-from densarm.swept_bound import SweptBound
 
 ARMS = {
     "panda": ("ready", Sphere(name="ball", radius=0.1, position=[0.5, 0.1, 0.4])),

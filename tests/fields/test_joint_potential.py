@@ -14,8 +14,8 @@ from densarm.fields.barriers import Barriers
 from densarm.fields.joint_navigation_function import JointNavigationFunction
 from densarm.fields.joint_potential import PotentialAscent
 from densarm.fields.joint_potential_field import JointPotentialField
+from densarm.proof.swept_bound import SweptBound
 from densarm.scene import Scene, Sphere
-from densarm.swept_bound import SweptBound
 
 POTENTIALS = {
     "potential_field": lambda barriers, distance: JointPotentialField(barriers, distance, 0.3, 0.5),

@@ -12,9 +12,9 @@ from densarm.arm import Arm, load_arm
 from densarm.clearance import Clearance
 from densarm.errors import InvalidValueError
 from densarm.fields import SpeedLaw, SpeedParameters
+from densarm.proof.straight_brake import StraightBrake
+from densarm.proof.swept_bound import SweptBound
 from densarm.scene import Scene, Sphere
-from densarm.straight_brake import StraightBrake
-from densarm.swept_bound import SweptBound
 
 MARGIN = 0.01  # [m]
 NV, PAIRS = 7, 3

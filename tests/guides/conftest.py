@@ -9,7 +9,7 @@ import pytest
 
 from densarm.arm import Arm
 from densarm.arrays import Array
-from densarm.robot_description import RobotDescription
+from densarm.robot.robot_description import RobotDescription
 
 BOUND = 3.0  # [m]
 

@@ -6,8 +6,8 @@ import pytest
 from densarm.arm import load_arm
 from densarm.clearance import Clearance
 from densarm.guides import GuidePath, PathGuide
+from densarm.proof.swept_bound import SweptBound
 from densarm.scene import Box, Scene, Sphere
-from densarm.swept_bound import SweptBound
 
 TWO_LINK = (
     "two_link",

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from densarm.clearance import Clearance
+from densarm.proof.swept_bound import SweptBound
 from densarm.scenario import load_scenario
-from densarm.swept_bound import SweptBound
 
 
 @pytest.fixture(scope="session")

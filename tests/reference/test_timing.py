@@ -7,13 +7,13 @@ import pytest
 from densarm.arm import load_arm
 from densarm.clearance import Clearance
 from densarm.errors import InvalidValueError
+from densarm.proof.stopping_check import StoppingCheck
+from densarm.proof.straight_brake import StraightBrake
+from densarm.proof.swept_bound import SweptBound
 from densarm.reference import InfeasibleTimingError, TimingParameters
 from densarm.reference.smooth_path import smooth_path
 from densarm.reference.timing import time_path
 from densarm.scene import Scene, Sphere
-from densarm.stopping_check import StoppingCheck
-from densarm.straight_brake import StraightBrake
-from densarm.swept_bound import SweptBound
 
 PERIOD = 0.001  # [s]
 EXCESS = 1.02  # limits hold at grid points; between them the excess is this small

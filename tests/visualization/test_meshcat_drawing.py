@@ -6,7 +6,7 @@ import pinocchio as pin
 import pytest
 
 from densarm.arm import Arm
-from densarm.robot_description import RobotDescription
+from densarm.robot.robot_description import RobotDescription
 from densarm.scene import Scene
 from densarm.visualization.meshcat_drawing import draw
 from densarm.visualization.stage import Stage

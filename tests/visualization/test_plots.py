@@ -6,7 +6,7 @@ import pytest
 from densarm.arm import Arm
 from densarm.errors import FileContentError, InvalidValueError
 from densarm.outcome import Outcome
-from densarm.robot_description import RobotDescription
+from densarm.robot.robot_description import RobotDescription
 from densarm.scenario import Scenario, load_scenario
 from densarm.scene import Scene
 from densarm.trajectory import Trajectory

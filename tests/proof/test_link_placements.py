@@ -9,9 +9,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from densarm.arm import Arm, load_arm
-from densarm.link_placements import joint_chain, write_placements
+from densarm.proof.link_placements import joint_chain, write_placements
 
-BRANCHING = Path(__file__).parent / "data" / "branching.urdf"
+BRANCHING = Path(__file__).parents[1] / "data" / "branching.urdf"
 BASE = pin.SE3(pin.rpy.rpyToMatrix(0.3, -0.7, 2.0), np.array([0.4, -0.2, 0.9]))
 POSITIONS = st.tuples(*[st.floats(-4.0, 4.0)] * 7)
 ARMS = {

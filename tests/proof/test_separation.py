@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from densarm.separation import ACCURACY, rounded_hulls, separation
+from densarm.proof.separation import ACCURACY, rounded_hulls, separation
 from densarm.shapes import box_hull, convex_hull
 
 SEED = st.integers(0, 2**32 - 1)

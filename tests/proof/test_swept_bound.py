@@ -12,11 +12,11 @@ from densarm.arm import Arm, load_arm
 from densarm.attachment import Attachment
 from densarm.clearance import Clearance
 from densarm.errors import InvalidValueError
+from densarm.proof.swept_bound import SweptBound
 from densarm.scene import Box, Capsule, Cylinder, Scene, Sphere
 from densarm.shapes import extreme_points
-from densarm.swept_bound import SweptBound
 
-BRANCHING = Path(__file__).parent / "data" / "branching.urdf"
+BRANCHING = Path(__file__).parents[1] / "data" / "branching.urdf"
 BASE = pin.SE3(pin.rpy.rpyToMatrix(0.3, -0.7, 2.0), np.array([0.4, -0.2, 0.9]))
 SCENE = Scene(
     [

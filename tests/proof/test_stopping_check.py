@@ -7,10 +7,10 @@ from hypothesis import strategies as st
 
 from densarm.arm import load_arm
 from densarm.clearance import Clearance
+from densarm.proof.stopping_check import StoppingCheck
+from densarm.proof.straight_brake import StraightBrake
+from densarm.proof.swept_bound import SweptBound
 from densarm.scene import Scene, Sphere
-from densarm.stopping_check import StoppingCheck
-from densarm.straight_brake import StraightBrake
-from densarm.swept_bound import SweptBound
 
 ARM = load_arm("two_link")
 

@@ -6,9 +6,9 @@ from enum import StrEnum
 import numpy as np
 
 from densarm.arrays import Array
-from densarm.bisection import bisect
 from densarm.clearance import DISTANCE_TOLERANCE
-from densarm.swept_bound import SweptBound
+from densarm.proof.bisection import bisect
+from densarm.proof.swept_bound import SweptBound
 
 
 class SweptVerdict(StrEnum):

@@ -8,7 +8,7 @@ import pinocchio as pin
 
 from densarm.arrays import Array
 from densarm.errors import RobotDescriptionError, UnknownNameError
-from densarm.urdf import Urdf
+from densarm.robot.urdf import Urdf
 from densarm.validation import finite_vector
 
 _LINK_MARK = " (link)"

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from densarm.arm import Arm, load_arm
-from densarm.robot_description import RobotDescription
-from densarm.self_collision import Exclusion
+from densarm.robot.robot_description import RobotDescription
+from densarm.robot.self_collision import Exclusion
 
-DATA = Path(__file__).parent / "data"
+DATA = Path(__file__).parents[1] / "data"
 
 
 def named_pairs(arm: Arm) -> set[frozenset[str]]:

@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 from densarm.arrays import Array
 from densarm.clearance import DISTANCE_TOLERANCE
 from densarm.compiled import compiled
-from densarm.moving_hulls import (
+from densarm.proof.moving_hulls import (
     MovingHulls,
     Placements,
     moving_hulls,
@@ -15,8 +15,8 @@ from densarm.moving_hulls import (
     placements,
     write_relative,
 )
-from densarm.separation import separation
-from densarm.swept_bound import SweptBound
+from densarm.proof.separation import separation
+from densarm.proof.swept_bound import SweptBound
 
 _FLOOR = 1e-4  # [rad or m], length of a segment at which one not proved clear counts as not clear
 

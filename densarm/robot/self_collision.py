@@ -9,7 +9,7 @@ import pinocchio as pin
 
 from densarm.arrays import Array
 from densarm.errors import RobotDescriptionError, UnknownNameError
-from densarm.robot_description import parse_robot_xml
+from densarm.robot.robot_description import parse_robot_xml
 
 _SAMPLES = 1000
 """Random configurations by which a pair that always collides is recognised."""

@@ -6,10 +6,10 @@ from dataclasses import replace
 import numpy as np
 
 from densarm.errors import InvalidValueError, UnknownNameError
-from densarm.locked_joints import mimicking_joints
-from densarm.robot_description import RobotDescription
-from densarm.robot_models import joint_names
-from densarm.urdf import Urdf
+from densarm.robot.locked_joints import mimicking_joints
+from densarm.robot.robot_description import RobotDescription
+from densarm.robot.robot_models import joint_names
+from densarm.robot.urdf import Urdf
 from densarm.validation import finite_tuple
 
 

@@ -21,7 +21,7 @@ from densarm.errors import (
     RobotDescriptionError,
     UnknownNameError,
 )
-from densarm.robot_description import (
+from densarm.robot.robot_description import (
     RobotDescription,
     data_wheel_folder,
     parse_robot_xml,
@@ -30,7 +30,7 @@ from densarm.robot_description import (
     resolve_path,
 )
 
-BRANCHING = Path(__file__).parent / "data" / "branching.urdf"
+BRANCHING = Path(__file__).parents[1] / "data" / "branching.urdf"
 
 
 @pytest.mark.parametrize("shapes", ["hull", "capsule"])
@@ -88,7 +88,7 @@ def test_paths():
 
 
 def test_missing_wheel(monkeypatch):
-    monkeypatch.setattr("densarm.robot_description.DATA_WHEEL", "no-such-robot-data")
+    monkeypatch.setattr("densarm.robot.robot_description.DATA_WHEEL", "no-such-robot-data")
     with pytest.raises(RobotDescriptionError, match="pip install no-such-robot-data"):
         data_wheel_folder()
 

@@ -5,8 +5,8 @@ from collections.abc import Iterable
 from dataclasses import replace
 
 from densarm.errors import UnknownNameError
-from densarm.robot_description import RobotDescription, parse_robot_xml
-from densarm.robot_models import joint_names
+from densarm.robot.robot_description import RobotDescription, parse_robot_xml
+from densarm.robot.robot_models import joint_names
 
 
 def without_subtrees(description: RobotDescription, joints: Iterable[str]) -> RobotDescription:

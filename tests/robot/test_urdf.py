@@ -11,9 +11,9 @@ import pytest
 
 from densarm.arm import Arm
 from densarm.errors import RobotDescriptionError
-from densarm.robot_description import RobotDescription
+from densarm.robot.robot_description import RobotDescription
 
-DATA = Path(__file__).parent / "data"
+DATA = Path(__file__).parents[1] / "data"
 TEXT = (DATA / "branching.urdf").read_text()
 
 CORNERS = np.array([[0, 0, 0], [0.1, 0, 0], [0, 0.2, 0], [0, 0, 0.3]])

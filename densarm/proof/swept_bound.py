@@ -6,8 +6,8 @@ import numpy as np
 import pinocchio as pin
 
 from densarm.arrays import Array
-from densarm.bisection import Pairs, bisect
 from densarm.clearance import DISTANCE_TOLERANCE, Clearance, joint_support
+from densarm.proof.bisection import Pairs, bisect
 from densarm.shapes import extreme_points
 from densarm.validation import non_negative
 

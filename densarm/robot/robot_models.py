@@ -7,17 +7,17 @@ from typing import NamedTuple
 import numpy as np
 import pinocchio as pin
 
-from densarm.attached_bodies import (
+from densarm.errors import RobotDescriptionError, UnknownNameError
+from densarm.robot.attached_bodies import (
     add_attached_inertia,
     add_attached_pairs,
     add_attached_shapes,
 )
-from densarm.errors import RobotDescriptionError, UnknownNameError
-from densarm.locked_joints import lock_joints, locked_positions, refuse_mimics
-from densarm.robot_description import RobotDescription
-from densarm.self_collision import ExcludedPair, add_self_collision_pairs
+from densarm.robot.locked_joints import lock_joints, locked_positions, refuse_mimics
+from densarm.robot.robot_description import RobotDescription
+from densarm.robot.self_collision import ExcludedPair, add_self_collision_pairs
+from densarm.robot.urdf import Urdf
 from densarm.shapes import differentiable_geometry
-from densarm.urdf import Urdf
 from densarm.validation import finite_vector, unit_quaternion
 
 _SAMPLES = 5

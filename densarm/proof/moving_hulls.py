@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from densarm.arrays import Array
 from densarm.clearance import Clearance
 from densarm.compiled import compiled
-from densarm.link_placements import JointChain, joint_chain, write_placements
-from densarm.separation import RoundedHulls, rounded_hulls
+from densarm.proof.link_placements import JointChain, joint_chain, write_placements
+from densarm.proof.separation import RoundedHulls, rounded_hulls
 
 
 class MovingHulls(NamedTuple):

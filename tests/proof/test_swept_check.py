@@ -5,10 +5,10 @@ import pytest
 
 from densarm.arm import Arm, load_arm
 from densarm.clearance import DISTANCE_TOLERANCE, Clearance
-from densarm.robot_description import RobotDescription
+from densarm.proof.swept_bound import SweptBound
+from densarm.proof.swept_check import SweptCheck, SweptVerdict
+from densarm.robot.robot_description import RobotDescription
 from densarm.scene import Scene, Sphere
-from densarm.swept_bound import SweptBound
-from densarm.swept_check import SweptCheck, SweptVerdict
 
 LENGTH, RADIUS = 1.0, 0.05  # [m], of each link of the two-link arm
 ORBIT, BALL = 0.5, 0.1  # [m], circle on which the ball of `orbiting` runs, and its radius

@@ -14,10 +14,10 @@ from densarm.arm import Arm, load_arm
 from densarm.attachment import Attachment
 from densarm.clearance import Clearance
 from densarm.errors import DensarmError, InvalidValueError
-from densarm.robot_description import RobotDescription
+from densarm.proof.swept_bound import SweptBound
+from densarm.proof.swept_check import SweptCheck, SweptVerdict
+from densarm.robot.robot_description import RobotDescription
 from densarm.scene import Box, Capsule, Cylinder, HalfSpace, Mesh, Scene, Sphere
-from densarm.swept_bound import SweptBound
-from densarm.swept_check import SweptCheck, SweptVerdict
 
 RADIUS, MASS = 0.08, 1.5
 INERTIA = 0.4 * MASS * RADIUS**2

@@ -8,7 +8,7 @@ import pytest
 from densarm.arm import Arm, load_arm
 from densarm.errors import UnknownNameError
 
-DATA = Path(__file__).parent / "data"
+DATA = Path(__file__).parents[1] / "data"
 BRANCHING = DATA / "branching.urdf"
 SRDF = DATA / "branching.srdf"
 

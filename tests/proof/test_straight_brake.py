@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from densarm.arm import Arm, load_arm
-from densarm.straight_brake import HELD_SHARE, StraightBrake
+from densarm.proof.straight_brake import HELD_SHARE, StraightBrake
 
 BETWEEN = 1.05  # by which torques may exceed their limits between the instants that are checked
 

@@ -9,11 +9,11 @@ from hypothesis import strategies as st
 
 from densarm.arm import load_arm
 from densarm.clearance import Clearance
+from densarm.proof.separating_planes import SeparatingPlanes
+from densarm.proof.swept_bound import SweptBound
 from densarm.scene import Box, Capsule, Cylinder, HalfSpace, Scene, Sphere
-from densarm.separating_planes import SeparatingPlanes
-from densarm.swept_bound import SweptBound
 
-BRANCHING = Path(__file__).parent / "data" / "branching.urdf"
+BRANCHING = Path(__file__).parents[1] / "data" / "branching.urdf"
 SCENE = Scene(
     [
         Sphere(name="ball", radius=0.1, position=(0.5, 0.2, 0.5)),

@@ -11,7 +11,7 @@ import pinocchio as pin
 
 from densarm.captured_stderr import captured_stderr
 from densarm.errors import RobotDescriptionError
-from densarm.robot_description import RobotDescription, parse_robot_xml, resolve_package_dir
+from densarm.robot.robot_description import RobotDescription, parse_robot_xml, resolve_package_dir
 
 T = TypeVar("T")
 

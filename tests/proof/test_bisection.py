@@ -4,7 +4,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from densarm.bisection import bisect
+from densarm.proof.bisection import bisect
 
 FLOOR = 1e-4
 WAVE = st.tuples(st.floats(0.5, 20.0), st.floats(0.0, 7.0), st.floats(-0.2, 1.0))

@@ -6,9 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from densarm.arrays import Array
-from densarm.separating_planes import SeparatingPlanes
-from densarm.straight_brake import StraightBrake
-from densarm.swept_bound import SweptBound
+from densarm.proof.separating_planes import SeparatingPlanes
+from densarm.proof.straight_brake import StraightBrake
+from densarm.proof.swept_bound import SweptBound
 
 _LARGEST_GROUP = 64  # samples whose brakes are tried at once
 _ROUNDING = 1e-9  # [rad or m]

@@ -1,0 +1,1 @@
+"""From a URDF and SRDF to the models of an arm."""
