@@ -54,6 +54,7 @@ class Arm:
         self.joint_names: tuple[str, ...] = tuple(self.model.names)[1:]
         self.idx_q: NDArray[np.int64] = np.array([joint.idx_q for joint in joints])
         self.is_circle: NDArray[np.bool_] = np.array([joint.nq == 2 for joint in joints])
+        self._circles: list[int] = np.flatnonzero(self.is_circle).tolist()
         self.limits: JointLimits = joint_limits(self.model, description.acceleration)
         self.end_effector_frame = end_effector_frame(self.model, description.end_effector)
         self.end_effector: str = self.model.frames[self.end_effector_frame].name
@@ -101,10 +102,11 @@ class Arm:
 
     def configurations(self, angles: Array) -> Array:
         """Return the configurations (..., nq) of joint positions (..., nv), without checks."""
-        q = np.zeros((*angles.shape[:-1], self.nq))
-        circle = self.is_circle
-        q[..., self.idx_q] = np.where(circle, np.cos(angles), angles)
-        q[..., self.idx_q[circle] + 1] = np.sin(angles[..., circle])
+        q = np.empty((*angles.shape[:-1], self.nq))
+        q[..., self.idx_q] = angles
+        for joint in self._circles:
+            at, angle = self.idx_q[joint], angles[..., joint]
+            q[..., at], q[..., at + 1] = np.cos(angle), np.sin(angle)
         return q
 
     def angles(self, q: ArrayLike) -> Array:
@@ -113,9 +115,10 @@ class Arm:
         A continuous joint's angle lies in (-pi, pi].
         """
         q = np.asarray(q, dtype=np.float64)
-        theta = q[..., self.idx_q]
-        circle = self.idx_q[self.is_circle]
-        theta[..., self.is_circle] = np.arctan2(q[..., circle + 1], q[..., circle])
+        theta = q.take(self.idx_q, axis=-1)
+        for joint in self._circles:
+            at = self.idx_q[joint]
+            theta[..., joint] = np.arctan2(q[..., at + 1], q[..., at])
         return theta
 
     def check_configuration(self, name: str, q: ArrayLike) -> Array:
@@ -150,8 +153,9 @@ class Arm:
             q_to ⊖ q_from [rad or m]; the short way round on continuous joints.
         """
         delta = self.angles(q_to) - self.angles(q_from)
-        circle = self.is_circle
-        delta[..., circle] = np.arctan2(np.sin(delta[..., circle]), np.cos(delta[..., circle]))
+        for joint in self._circles:
+            turn = delta[..., joint]
+            delta[..., joint] = np.arctan2(np.sin(turn), np.cos(turn))
         return delta
 
     def integrate(self, q: Array, step: Array) -> Array:

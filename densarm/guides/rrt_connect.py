@@ -68,6 +68,7 @@ class _JointSpace:
         self._arm = arm
         bounded, circles = np.flatnonzero(~arm.is_circle), np.flatnonzero(arm.is_circle)
         self._order = np.concatenate([bounded, circles])
+        self._position = np.argsort(self._order)
         self._box = slice(0, len(bounded))
         self._space = ob.CompoundStateSpace()
         if bounded.size:  # OMPL refuses a box without a side
@@ -96,9 +97,8 @@ class _JointSpace:
     def configuration(self, state: ob.State) -> Array:
         """Return the configuration (nq,) of a state."""
         box = state[0][self._box] if self._box.stop else []
-        angles = np.empty(len(self._order))
-        angles[self._order] = box + [state[index].value for index in self._circles]
-        return self._arm.configuration(angles)
+        values = np.array(box + [state[index].value for index in self._circles])
+        return self._arm.configurations(values.take(self._position))
 
 
 def _box(lower: Array, upper: Array) -> ob.RealVectorStateSpace:

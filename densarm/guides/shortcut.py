@@ -26,18 +26,24 @@ def shortcut(
     Returns:
         (W', nq) waypoints with the same ends, joined by clear segments, not longer than `path`.
     """
-    for _ in range(steps):
-        step = arm.difference(path[:-1], path[1:])
-        length = np.linalg.norm(step, axis=1)
-        arc = np.concatenate([[0.0], np.cumsum(length)])
-        s = np.sort(rng.uniform(0.0, arc[-1], 2))
+    step, length, arc = _arc_length(arm, path)
+    for share in np.sort(rng.uniform(size=(steps, 2))):
+        s = share * arc[-1]
         segment = np.searchsorted(arc[1:-1], s, side="right")
         fraction = (s - arc[segment]) / length[segment]
         a, b = arm.integrate(path[segment], fraction[:, None] * step[segment])
         gain = (s[1] - s[0]) - np.linalg.norm(arm.difference(a, b))
         if gain > _LEAST_GAIN * arc[-1] and freedom.segment_is_clear(a, b):
             path = np.vstack([path[: segment[0] + 1], a, b, path[segment[1] + 1 :]])
+            step, length, arc = _arc_length(arm, path)
     return _without_needless_waypoints(freedom, path)
+
+
+def _arc_length(arm: Arm, path: Array) -> tuple[Array, Array, Array]:
+    """Return the steps of a path, their lengths, and the length up to each waypoint."""
+    step = arm.difference(path[:-1], path[1:])
+    length = np.linalg.norm(step, axis=1)
+    return step, length, np.concatenate([[0.0], np.cumsum(length)])
 
 
 def _without_needless_waypoints(freedom: FreeSpace, path: Array) -> Array:

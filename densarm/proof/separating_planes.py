@@ -6,27 +6,25 @@ from numpy.typing import NDArray
 from densarm.arrays import Array
 from densarm.clearance import DISTANCE_TOLERANCE
 from densarm.compiled import compiled
-from densarm.proof.moving_hulls import (
-    MovingHulls,
-    Placements,
-    moving_hulls,
-    near_pairs,
-    place,
-    placements,
-    write_relative,
-)
-from densarm.proof.separation import separation
+from densarm.proof.arc_proof import append_unproved, keep_unproved
+from densarm.proof.motion_bounds import write_motion_bounds
+from densarm.proof.moving_hulls import moving_hulls, place
 from densarm.proof.swept_bound import SweptBound
 
 _FLOOR = 1e-4  # [rad or m], length of a segment at which one not proved clear counts as not clear
 
 
 class SeparatingPlanes:
-    """Proves segments as `SweptBound` does, but from lower bounds on distances in compiled code.
+    r"""Proves segments as `SweptBound` does, but by planes between bodies, in compiled code.
 
-    A plane between two bodies bounds their distance from below; the bound is within 1 % of the
-    distance, and takes the place of it in the proof. Bodies whose enclosing balls are farther
-    apart than they move need no plane.
+    Let a plane that moves with the last joint of both bodies of a pair leave a gap of f_a, f_b
+    beyond the margin at both ends of a segment. The points of the bodies leave straight lines with
+    accelerations of β at most, hence the gap on the segment, at s in [0, 1], is
+
+    .. math:: f(s) \ge (1 - s) f_a + s f_b - \tfrac{1}{2} \beta s (1 - s) > 0
+        \iff \beta < 2 (\sqrt{f_a} + \sqrt{f_b})^2.
+
+    Where neither this nor the distances at both ends prove a pair, the segment is halved.
 
     Args:
         bound: the pairs, the bound on their motion, and the margin to be kept.
@@ -35,10 +33,12 @@ class SeparatingPlanes:
     def __init__(self, bound: SweptBound) -> None:
         self._arm = bound.arm
         self._lever = bound.lever
-        self._kept = bound.margin + DISTANCE_TOLERANCE
-        self._bodies = moving_hulls(bound.clearance)
-        self._placements = (placements(self._bodies), placements(self._bodies))
-        self._corners = _any_corners(self._bodies)
+        self._kept = np.full(len(bound.lever), bound.margin + DISTANCE_TOLERANCE)
+        bodies, some_corner = moving_hulls(bound.clearance)
+        self._bodies = (*bodies, bound.shape_lever)
+        self._corners = np.full((len(some_corner), 4, 2), -1)
+        self._corners[:, 0] = some_corner
+        self._order = np.arange(len(some_corner))
 
     def configuration_is_clear(self, q: Array) -> bool:
         """Return whether every distance at q (nq,) is proved above the margin."""
@@ -52,7 +52,7 @@ class SeparatingPlanes:
             q_b: the other end (nq,), reached the short way round on continuous joints.
         """
         step = self._arm.difference(q_a, q_b)
-        return self.tube_is_clear(self._arm.angles(q_a), step, np.zeros_like(step))
+        return self._is_clear(self._arm.angles(q_a), step, self._kept)
 
     def tube_is_clear(self, angles: Array, step: Array, radius: Array) -> bool:
         """Return whether every distance is proved above the margin on and around a segment.
@@ -62,138 +62,112 @@ class SeparatingPlanes:
             step: from there to the other end (nv,) [rad or m].
             radius: how far each joint may be off the segment (nv,) [rad or m].
         """
-        motion = self._lever @ np.abs(step)
-        longest = float(np.abs(step).max())
-        depth = 0 if longest <= _FLOOR else int(np.ceil(np.log2(longest / _FLOOR)))
-        return bool(
-            _segment_is_clear(
-                self._bodies,
-                *self._placements,
-                self._corners,
-                angles,
-                step,
-                motion,
-                self._kept + self._lever @ radius,
-                depth,
-            )
-        )
+        return self._is_clear(angles, step, self._kept + self._lever @ radius)
 
-
-def _any_corners(bodies: MovingHulls) -> NDArray[np.int64]:
-    """Return one pair of corners for each pair of shapes, in the form of `separation`."""
-    corners = np.full((len(bodies.pairs), 4, 2), -1)
-    corners[:, 0] = bodies.hulls.first[bodies.pairs]
-    return corners
+    def _is_clear(self, angles: Array, step: Array, kept: Array) -> bool:
+        state = self._corners, self._order
+        return bool(_segment_is_clear(*self._bodies, *state, kept, angles, step))
 
 
 @compiled
 def _segment_is_clear(
-    bodies: MovingHulls,
-    at_a: Placements,
-    at_b: Placements,
+    parent: NDArray[np.int64],
+    joints: Array,
+    joint: NDArray[np.int64],
+    frame: Array,
+    box: Array,
+    ball: Array,
+    points: Array,
+    neighbours: NDArray[np.int64],
+    first_neighbour: NDArray[np.int64],
+    radius: Array,
+    pairs: NDArray[np.int64],
+    lever: Array,
     corners: NDArray[np.int64],
+    order: NDArray[np.int64],
+    kept: Array,
     angles: Array,
     step: Array,
-    motion: Array,
-    kept: Array,
-    depth: int,
 ) -> bool:
-    """Prove all pairs; arcs that two distances do not prove are halved, all of a length in turn."""
-    place(bodies, at_a, angles, step, 0.0)
-    place(bodies, at_b, angles, step, 1.0)
-    pair = near_pairs(bodies, at_a, at_b, motion, kept)
-    count, arc = pair.size, np.zeros(pair.size, np.int64)
-    slack_a, slack_b, middle = np.empty(count), np.empty(count), np.empty(count)
-    # The far end first: planners start from an end that is clear.
-    if not _write_slack(bodies, at_b, corners, pair, kept, motion, 1.0, slack_b):
-        return False
-    if not _write_slack(bodies, at_a, corners, pair, kept, motion, 1.0, slack_a):
-        return False
-    for level in range(depth + 1):
-        share = 0.5**level
-        count = _keep_open(pair, arc, slack_a, slack_b, count, motion, share)
-        if count == 0 or level == depth:
-            break
-        middle, begin = np.empty(count), 0
+    """Prove all pairs; arcs on which some are not proved are halved, all of a length in turn."""
+    joint_pose, joint_end = np.empty((parent.size, 12)), np.empty((parent.size, 12))
+    shape_pose, shape_end = frame.copy(), frame.copy()
+    motion, bend = np.empty((joint.size, parent.size)), np.empty((joint.size, parent.size))
+    count, share, longest = order.size, 1.0, 0.0
+    none = count - count  # functions that take a literal 0 are compiled for it, and again
+    pairs_on_arcs = np.empty((count, 2), np.int64)
+    for n in range(count):
+        pairs_on_arcs[n, 0], pairs_on_arcs[n, 1] = order[n], 0
+    for rate in step:
+        longest = rate if rate > longest else max(longest, -rate)
+    while True:
+        planes, halves = np.empty((count, 4)), np.empty((2 * count, 2), np.int64)
+        begin = waiting = none
         while begin < count:
-            end = begin
-            while end < count and arc[end] == arc[begin]:
+            arc, end = pairs_on_arcs[begin, 1], begin + 1
+            while end < count and pairs_on_arcs[end, 1] == arc:
                 end += 1
-            place(bodies, at_a, angles, step, (arc[begin] + 0.5) * share)
-            if not _write_slack(
-                bodies, at_a, corners, pair[begin:end], kept, motion, 0.5 * share, middle[begin:end]
-            ):
+            at = (arc + 0.5) * share
+            place(parent, joints, joint, frame, angles, step, at, joint_pose, shape_pose)
+            write_motion_bounds(
+                parent,
+                joints,
+                joint,
+                ball,
+                lever,
+                step,
+                share,
+                joint_pose,
+                shape_pose,
+                motion,
+                bend,
+            )
+            unproved = keep_unproved(
+                box,
+                ball,
+                points,
+                neighbours,
+                first_neighbour,
+                radius,
+                pairs,
+                kept,
+                corners,
+                order,
+                shape_pose,
+                motion,
+                pairs_on_arcs,
+                begin,
+                end,
+                planes,
+            )
+            if unproved < 0:
                 return False
+            for side in range(2 if unproved > begin else 0):
+                at = (arc + side) * share
+                place(parent, joints, joint, frame, angles, step, at, joint_end, shape_end)
+                waiting = append_unproved(
+                    points,
+                    neighbours,
+                    first_neighbour,
+                    radius,
+                    pairs,
+                    kept,
+                    corners,
+                    joint_pose,
+                    joint_end,
+                    shape_end,
+                    bend,
+                    pairs_on_arcs,
+                    begin,
+                    unproved,
+                    planes,
+                    2 * arc + side,
+                    halves,
+                    waiting,
+                )
             begin = end
-        pair, arc, slack_a, slack_b = _halves(pair, arc, slack_a, middle, slack_b)
-        count *= 2
-    return bool(count == 0)
-
-
-@compiled
-def _keep_open(
-    pair: NDArray[np.int64],
-    arc: NDArray[np.int64],
-    slack_a: Array,
-    slack_b: Array,
-    count: int,
-    motion: Array,
-    share: float,
-) -> int:
-    """Move to the front what the slack at both ends of an arc does not prove; return its number."""
-    kept = 0
-    for i in range(count):
-        if not slack_a[i] + slack_b[i] > share * motion[pair[i]]:
-            pair[kept], arc[kept] = pair[i], arc[i]
-            slack_a[kept], slack_b[kept] = slack_a[i], slack_b[i]
-            kept += 1
-    return kept
-
-
-@compiled
-def _halves(
-    pair: NDArray[np.int64], arc: NDArray[np.int64], slack_a: Array, middle: Array, slack_b: Array
-) -> tuple[NDArray[np.int64], NDArray[np.int64], Array, Array]:
-    """Return pairs, arcs and slacks of both halves of every arc, in the order of the arcs."""
-    count = middle.size
-    pairs, arcs = np.empty(2 * count, np.int64), np.empty(2 * count, np.int64)
-    first, last = np.empty(2 * count), np.empty(2 * count)
-    begin = 0
-    while begin < count:
-        end = begin
-        while end < count and arc[end] == arc[begin]:
-            end += 1
-        for i in range(begin, end):
-            left, right = begin + i, end + i
-            pairs[left] = pairs[right] = pair[i]
-            arcs[left], arcs[right] = 2 * arc[i], 2 * arc[i] + 1
-            first[left], last[left] = slack_a[i], middle[i]
-            first[right], last[right] = middle[i], slack_b[i]
-        begin = end
-    return pairs, arcs, first, last
-
-
-@compiled
-def _write_slack(
-    bodies: MovingHulls,
-    at: Placements,
-    corners: NDArray[np.int64],
-    pair: NDArray[np.int64],
-    kept: Array,
-    motion: Array,
-    share: float,
-    slack: Array,
-) -> bool:
-    """Write lower bounds on by how much pairs exceed what is to be kept, while they do [m]."""
-    hulls, pairs, rotation, translation = bodies.hulls, bodies.pairs, at.rotation, at.translation
-    between, offset = np.empty((3, 3)), np.empty(3)
-    for n in range(pair.size):
-        k = pair[n]
-        i, j = pairs[k, 0], pairs[k, 1]
-        write_relative(rotation, translation, i, j, between, offset)
-        held = kept[k] + hulls.radius[i] + hulls.radius[j]
-        enough = share * motion[k] + held
-        slack[n] = separation(hulls, between, offset, enough, corners[k]) - held
-        if not slack[n] > 0.0:
+        if waiting == 0:
+            return True
+        if longest * share <= _FLOOR:
             return False
-    return True
+        pairs_on_arcs, count, share = halves, waiting, 0.5 * share

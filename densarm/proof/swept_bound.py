@@ -39,6 +39,8 @@ class SweptBound:
         self.clearance = clearance
         self.arm = clearance.arm
         self.margin = non_negative("margin", margin)
+        self.shape_lever = self._shape_levers()
+        """For each shape the bounds r_j of the joints that move it (S, nv), else 0 [m/rad or 1]."""
         self.lever = self._pair_levers()
         """The bounds r_kj (K, nv) [m/rad, 1 for prismatic joints]."""
 
@@ -103,10 +105,13 @@ class SweptBound:
         )
         return None if len(result.failing) else result.evaluated
 
+    def _shape_levers(self) -> Array:
+        model, shapes = self.arm.model, self.clearance.geometry_model.geometryObjects
+        return np.array([_levers(model, item) for item in shapes]).reshape(-1, model.nv)
+
     def _pair_levers(self) -> Array:
         model, shapes = self.arm.model, self.clearance.geometry_model.geometryObjects
-        support = joint_support(model)
-        lever = np.array([_levers(model, item) for item in shapes]).reshape(-1, model.nv)
+        support, lever = joint_support(model), self.shape_lever
         moves = np.array([support[item.parentJoint] for item in shapes]).reshape(-1, model.nv)
         first, second = self.clearance.pair_shapes.T
         shared = moves[first] * moves[second]

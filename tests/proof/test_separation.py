@@ -4,10 +4,12 @@ import coal
 import numpy as np
 import pinocchio as pin
 import pytest
-from hypothesis import given
+from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from densarm.proof.separation import ACCURACY, rounded_hulls, separation
+from densarm.proof.link_placements import pose_row
+from densarm.proof.rounded_hulls import rounded_hulls
+from densarm.proof.separation import ACCURACY, plane_gap, separation
 from densarm.shapes import box_hull, convex_hull
 
 SEED = st.integers(0, 2**32 - 1)
@@ -28,14 +30,19 @@ def random_pose(rng: np.random.Generator, reach: float) -> pin.SE3:
 
 
 def any_corners(hulls) -> np.ndarray:
-    corners = np.full((4, 2), -1)
-    corners[0] = hulls.first[:2]
+    corners = np.full((1, 4, 2), -1)
+    corners[0, 0] = hulls.first[:2]
     return corners
 
 
-def bound(hulls, pose: pin.SE3, enough=ANY, corners=None) -> float:
+def bound(hulls, pose: pin.SE3, enough=ANY, corners=None, needed=0.0, normal=None) -> float:
     corners = any_corners(hulls) if corners is None else corners
-    return separation(hulls, pose.rotation, pose.translation, enough, corners)
+    normal = np.empty((1, 3)) if normal is None else normal
+    poses = np.array([pose_row(pose), pose_row(pin.SE3.Identity())])
+    space = np.empty((4, 4)), np.empty((4, 4))
+    return separation(
+        *hulls[:1], *hulls[2:4], poses, 0, 1, needed, enough, corners, 0, *space, normal, 0
+    )
 
 
 def distance(one, other, pose: pin.SE3) -> float:
@@ -89,3 +96,33 @@ def test_spheres_and_capsules_are_points_and_segments_with_a_radius():
     np.testing.assert_array_equal(hulls.radius, [0.1, 0.3])
     found = bound(hulls, pin.SE3(np.eye(3), np.array([3.0, 0.0, 4.5])))
     assert 5.0 * (1.0 - ACCURACY) <= found <= 5.0
+
+
+@given(seed=SEED, needed=st.floats(0.0, 1.0))
+def test_stops_where_less_than_needed_is_left(seed, needed):
+    rng = np.random.default_rng(seed)
+    one, other = random_hull(rng), random_hull(rng)
+    hulls, pose = rounded_hulls([one, other]), random_pose(rng, 1.0)
+    exact = distance(one, other, pose)
+    found = bound(hulls, pose, needed=needed)
+    assert found <= max(exact, 0.0) + 1e-8
+    if exact > needed + 1e-7:
+        assert found >= (1.0 - ACCURACY) * exact - 1e-7
+
+
+@given(seed=SEED)
+def test_the_normal_is_of_a_plane_with_that_gap(seed):
+    rng = np.random.default_rng(seed)
+    one, other = random_hull(rng), random_hull(rng)
+    hulls, pose = rounded_hulls([one, other]), random_pose(rng, 1.0)
+    normals = np.zeros((1, 3))
+    found = bound(hulls, pose, normal=normals)
+    normal = normals[0]
+    assume(found > 0.0)
+    assert np.linalg.norm(normal) == pytest.approx(1.0)
+    near = (hulls.points[: hulls.first[1]] @ pose.rotation.T + pose.translation) @ normal
+    far = hulls.points[hulls.first[1] :] @ normal
+    assert near.min() - far.max() == pytest.approx(found, abs=1e-9)
+    poses = np.array([pose_row(pose), pose_row(pin.SE3.Identity())])
+    gap = plane_gap(*hulls[:1], *hulls[2:4], poses, 0, 1, *hulls.first[:2], *normal)
+    assert gap == pytest.approx(found, abs=1e-9)
