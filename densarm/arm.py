@@ -12,8 +12,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from densarm.arrays import Array
 from densarm.attachment import Attachment
-from densarm.catalogue import robot_description, robot_names
-from densarm.errors import InvalidValueError, UnknownNameError
+from densarm.catalogue import robot_description
+from densarm.errors import InvalidValueError
 from densarm.robot.cut_subtrees import without_subtrees
 from densarm.robot.joint_limits import JointLimits, joint_limits
 from densarm.robot.joint_selection import only_joints, without_joints
@@ -44,9 +44,16 @@ class Arm:
     def __init__(self, description: RobotDescription) -> None:
         self.description = description
         self.name = description.name
-        self.model, self.collision_model, excluded, self._mesh_files = build_models(description)
-        self.excluded_pairs: tuple[ExcludedPair, ...] = excluded
+        models = build_models(description)
+        self.model, self.collision_model = models.model, models.collision
+        self._mesh_files = models.mesh_files
+        self.excluded_pairs: tuple[ExcludedPair, ...] = models.excluded_pairs
         """Shapes that are not checked against each other though they move so, and why."""
+        self.links_without_collision: tuple[str, ...] = models.links_without_collision
+        """Links that the URDF draws and gives no collision geometry.
+
+        They collide as drawn, or not at all if `collision_from_visual` is "never".
+        """
         self.data = self.model.createData()
         self.nq: int = self.model.nq
         self.nv: int = self.model.nv
@@ -226,6 +233,7 @@ def load_arm(
     cut_joints: Iterable[str] = (),
     base_placement: pin.SE3 | None = None,
     shapes: str = "hull",
+    collision_from_visual: str | None = None,
 ) -> Arm:
     """Load an arm by name or from a URDF file.
 
@@ -245,22 +253,20 @@ def load_arm(
         shapes: "hull" for the convex hulls of the collision geometry, or "capsule" for the
             smallest capsule around each of them: larger, but distances cost less. Pairs that
             always collide are left out in either.
+        collision_from_visual: which links collide as they are drawn: "missing" for those without
+            collision geometry, "always" for all that are drawn, or "never"; None for "missing",
+            unless a known robot needs another. `Arm.links_without_collision` names those concerned.
 
     Raises:
         UnknownNameError: no such robot, joint to move, lock or cut at, or link of the SRDF.
         InvalidValueError: a locked position or base placement that is not finite, a locked joint
-            that shall be in the arm, or shapes of another name.
+            that shall be in the arm, or shapes or links to collide as drawn of another name.
         FileContentError: a file that cannot be read.
         RobotDescriptionError: a URDF or SRDF that cannot be used.
     """
-    path = Path(robot)
-    if str(robot) in robot_names():
-        description = robot_description(str(robot))
-    elif path.suffix == ".urdf" or path.is_file():
-        description = _description_of_file(path)
-    else:
-        raise UnknownNameError("robot", robot, [*robot_names(), "the path of a .urdf file"])
-    description = replace(description, shapes=shapes)
+    description = replace(robot_description(robot), shapes=shapes)
+    if collision_from_visual is not None:
+        description = replace(description, collision_from_visual=collision_from_visual)
     description = _with_options(description, srdf, package_dirs, base_placement)
     if cut := [cut_joints] if isinstance(cut_joints, str) else list(cut_joints):
         description = without_subtrees(description, cut)
@@ -268,12 +274,6 @@ def load_arm(
         chosen = (joints,) if isinstance(joints, str) else tuple(joints)
         return Arm(only_joints(description, chosen, locked_joints or {}))
     return Arm(without_joints(description, locked_joints or {}))
-
-
-def _description_of_file(path: Path) -> RobotDescription:
-    folder = path.resolve().parent
-    nearby = tuple(str(above) for above in (folder, *folder.parents))
-    return RobotDescription(name=path.stem, urdf=read_text(path), package_dirs=nearby)
 
 
 def _with_options(

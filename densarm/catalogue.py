@@ -25,17 +25,27 @@ def scenario_paths() -> dict[str, Path]:
     return {path.stem: path for path in sorted(robots_folder().glob("*/scenarios/*.toml"))}
 
 
-def robot_description(name: str) -> RobotDescription:
-    """Return the description of a named robot.
+def robot_description(robot: str | Path) -> RobotDescription:
+    """Return the description of a robot.
 
     Args:
-        name: one of `robot_names`.
+        robot: one of `robot_names`, or the path of a URDF.
 
     Raises:
         UnknownNameError: no such robot.
+        FileContentError: the file cannot be read.
     """
-    if name not in robot_names():
-        raise UnknownNameError("robot", name, robot_names())
+    path = Path(robot)
+    if str(robot) in robot_names():
+        return _named_robot(str(robot))
+    if path.suffix != ".urdf" and not path.is_file():
+        raise UnknownNameError("robot", robot, [*robot_names(), "the path of a .urdf file"])
+    folder = path.resolve().parent
+    nearby = tuple(str(above) for above in (folder, *folder.parents))
+    return RobotDescription(name=path.stem, urdf=read_text(path), package_dirs=nearby)
+
+
+def _named_robot(name: str) -> RobotDescription:
     folder = robots_folder() / name
     entry = read_toml(folder / "arm.toml")
     urdf = entry["urdf"]
@@ -49,6 +59,7 @@ def robot_description(name: str) -> RobotDescription:
         locked_joints=entry.get("locked_joints", {}),
         acceleration=None if acceleration is None else tuple(acceleration),
         end_effector=entry.get("end_effector"),
+        collision_from_visual=entry.get("collision_from_visual", "missing"),
         postures={key: tuple(value) for key, value in entry.get("postures", {}).items()},
     )
 

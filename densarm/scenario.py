@@ -253,6 +253,7 @@ class _RobotTable:
     base_placement: tuple[float, float, float, float, float, float, float] | None = None
     acceleration: tuple[float, ...] | None = None
     shapes: str = "hull"
+    collision_from_visual: str | None = None
 
 
 @dataclass(frozen=True)
@@ -274,6 +275,7 @@ def _parse_robot(folder: Path, table: _RobotTable) -> Arm:
         locked_joints=table.locked_joints,
         cut_joints=table.cut_joints,
         shapes=table.shapes,
+        collision_from_visual=table.collision_from_visual,
     )
     changes: dict[str, Any] = {}
     if table.base_placement is not None:

@@ -426,7 +426,11 @@ CHANGES = {
     "negative mass": ('mass value="1.0"', 'mass value="-1"', "negative mass"),
     "mass not finite": ('mass value="1.0"', 'mass value="inf"', "mass"),
     "no inertia": (r"(?s)<inertial>.*?</inertial>", "", "'wrist' moves no mass.*<inertial>"),
-    "no collision": (r"(?s)<collision>.*?</collision>", "", "'temporary'.*no <collision> geometry"),
+    "no collision": (
+        r"(?s)<(collision|visual)>.*?</\1>",
+        "",
+        "'temporary'.*no <collision> geometry",
+    ),
 }
 
 

@@ -22,7 +22,7 @@ def scenario(request) -> Scenario:
 def test_the_tasks_that_people_are_told_of_are_known():
     known = {"three_link_gate", "ur5_bin", "xarm7_posts", "kinova_posts", "z1_window"}
     panda = {"panda_table", "panda_shelf", "panda_holding_bar"}
-    assert known | panda | {"so101_desk", "swing_up"} <= set(scenario_paths())
+    assert known | panda | {"so100_desk", "swing_up"} <= set(scenario_paths())
 
 
 def test_scenario_has_a_title_obstacles_and_default_control(scenario):

@@ -12,6 +12,7 @@ from densarm.bench.problem_results import run_problem
 from densarm.catalogue import robot_names
 from densarm.clearance import Clearance
 from densarm.outcome import Outcome
+from densarm.robot.robot_description import parse_robot_xml
 from densarm.robot.self_collision import Exclusion
 from densarm.scene import Scene
 
@@ -24,8 +25,8 @@ def arm(request) -> Arm:
 
 
 def test_arms_that_people_have_are_known():
-    known = {"panda", "ur3", "ur5", "ur10", "xarm7", "z1", "kinova", "so101", "three_link"}
-    assert known <= set(robot_names())
+    known = {"panda", "ur3", "ur5", "ur10", "xarm7", "z1", "kinova", "so100", "so101"}
+    assert known | {"two_link", "three_link"} <= set(robot_names())
 
 
 def test_postures_touch_nothing_and_are_within_limits(arm):
@@ -62,6 +63,17 @@ def test_every_two_shapes_that_move_against_each_other_are_checked_or_listed(arm
     left_out = {frozenset(pair.shapes) for pair in arm.excluded_pairs}
     assert checked | left_out == moving
     assert not checked & left_out
+
+
+def test_every_link_that_is_drawn_can_collide(arm):
+    if arm.name in {"two_link", "three_link"}:
+        assert arm.links_without_collision == ("base",)
+        return
+    frames = [item.parentFrame for item in arm.collision_model.geometryObjects]
+    links = parse_robot_xml(arm.description.urdf, "URDF").findall("link")
+    drawn = {link.get("name") for link in links if link.find("visual") is not None}
+    assert drawn
+    assert drawn <= {arm.model.frames[frame].name for frame in frames}
 
 
 def test_no_named_arm_needs_a_pair_left_out_since_it_always_collides(arm):

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from densarm.errors import DensarmError, FileContentError, RobotDescriptionError
+from densarm.robot.drawn_links import CollisionFromVisual
 
 if TYPE_CHECKING:
     from densarm.attachment import Attachment
@@ -31,7 +32,7 @@ class RobotDescription:
     Holding text, not paths, lets a recorded run rebuild its own arm.
 
     Raises:
-        InvalidValueError: shapes of another name.
+        InvalidValueError: shapes of another name, or links of another name to collide as drawn.
     """
 
     name: str
@@ -53,7 +54,8 @@ class RobotDescription:
     """Named joint positions, one number per joint [rad or m]."""
     shapes: str = "hull"
     """What distances are measured to: "hull" or "capsule"."""
-
+    collision_from_visual: str = "missing"
+    """Which links collide as they are drawn: "never", "missing" or "always"."""
     attachments: tuple[Attachment, ...] = ()
     """Bodies that the arm holds."""
 
@@ -61,6 +63,7 @@ class RobotDescription:
         from densarm.validation import one_of  # it imports NumPy, which listing does without
 
         one_of("shapes", self.shapes, SHAPES)
+        one_of("collision_from_visual", self.collision_from_visual, list(CollisionFromVisual))
 
     def to_json(self) -> dict[str, Any]:
         """Return the description as JSON data; `from_json` is its inverse."""
@@ -81,7 +84,9 @@ class RobotDescription:
             values["postures"] = {k: tuple(v) for k, v in values["postures"].items()}
             for key in ("package_dirs", "base_placement", "acceleration"):
                 values[key] = None if values[key] is None else tuple(values[key])
-            held = values.get("attachments", ())  # absent from what earlier versions wrote
+            # Absent from what earlier versions wrote.
+            values.setdefault("collision_from_visual", "never")
+            held = values.get("attachments", ())
             values["attachments"] = tuple(Attachment.from_json(item) for item in held)
             return cls(**values)
         except (TypeError, KeyError, AttributeError, ValueError) as error:

@@ -34,6 +34,8 @@ class RobotModels(NamedTuple):
     """The pairs of shapes that it leaves out."""
     mesh_files: dict[str, Path]
     """The collision meshes that were read, by their path from the folder that holds them all."""
+    links_without_collision: tuple[str, ...]
+    """The links that the URDF draws and gives no collision geometry."""
 
 
 def build_models(description: RobotDescription) -> RobotModels:
@@ -49,21 +51,25 @@ def build_models(description: RobotDescription) -> RobotModels:
         InvalidValueError: a locked position or base placement that is not finite, or an attached
             body named like a shape of the arm.
     """
-    model, collision = _parse(description, pin.GeometryType.COLLISION)
-    _require_arm(model)
-    if collision.ngeoms == 0:
-        raise RobotDescriptionError(
-            f"robot {description.name!r}: the URDF has no <collision> geometry, so no distance "
-            "can be computed: add shapes or meshes to its links"
-        )
-    files = _mesh_files(collision)
-    collision = differentiable_geometry(model, collision, description.shapes)
+    urdf = Urdf(description)
+    try:
+        model, collision = _place(description, urdf, pin.GeometryType.COLLISION)
+        _require_arm(model)
+        if collision.ngeoms == 0:
+            raise RobotDescriptionError(
+                f"robot {description.name!r}: the URDF has no <collision> geometry, so no distance "
+                "can be computed: add shapes or meshes to its links"
+            )
+        files = _mesh_files(collision)
+        collision = differentiable_geometry(model, collision, description.shapes)
+    except RobotDescriptionError as error:
+        raise _with_advice(error, urdf.links_without_collision) from None
     excluded = add_self_collision_pairs(model, collision, description.srdf)
     held = description.attachments
     add_attached_shapes(model, collision, held)
     add_attached_pairs(model, collision, held)
     add_attached_inertia(model, held)
-    return RobotModels(model, collision, excluded, files)
+    return RobotModels(model, collision, excluded, files, urdf.links_without_collision)
 
 
 def build_visual_model(description: RobotDescription) -> pin.GeometryModel:
@@ -75,7 +81,7 @@ def build_visual_model(description: RobotDescription) -> pin.GeometryModel:
     Raises:
         RobotDescriptionError: a mesh is missing.
     """
-    model, visual = _parse(description, pin.GeometryType.VISUAL)
+    model, visual = _place(description, Urdf(description), pin.GeometryType.VISUAL)
     add_attached_shapes(model, visual, description.attachments)
     return visual
 
@@ -111,10 +117,9 @@ def joint_names(description: RobotDescription) -> list[str]:
     return [name for name in list(urdf.model.names)[1:] if name not in locked]
 
 
-def _parse(
-    description: RobotDescription, kind: pin.GeometryType
+def _place(
+    description: RobotDescription, urdf: Urdf, kind: pin.GeometryType
 ) -> tuple[pin.Model, pin.GeometryModel]:
-    urdf = Urdf(description)
     locked = locked_positions(urdf, description.locked_joints)
     refuse_mimics(urdf, locked)
     model, geometry = lock_joints(urdf.model, urdf.geometry(kind), locked)
@@ -122,6 +127,15 @@ def _parse(
     placement[3:] = unit_quaternion("base_placement orientation", placement[3:])
     _place_base(model, geometry, pin.XYZQUATToSE3(placement))
     return model, geometry
+
+
+def _with_advice(error: RobotDescriptionError, drawn_only: tuple[str, ...]) -> Exception:
+    """Return an error that, where it is about a visual mesh, says how to do without."""
+    for link in drawn_only:
+        if f"link {link!r}" in str(error):
+            advice = "it has no <collision>; collision_from_visual='never' leaves it out"
+            return RobotDescriptionError(f"{error} ({advice})")
+    return error
 
 
 def _require_arm(model: pin.Model) -> None:

@@ -11,6 +11,11 @@ import pinocchio as pin
 
 from densarm.captured_stderr import captured_stderr
 from densarm.errors import RobotDescriptionError
+from densarm.robot.drawn_links import (
+    CollisionFromVisual,
+    collide_as_drawn,
+    links_without_collision,
+)
 from densarm.robot.robot_description import RobotDescription, parse_robot_xml, resolve_package_dir
 
 T = TypeVar("T")
@@ -33,6 +38,9 @@ class Urdf:
 
     def __init__(self, description: RobotDescription) -> None:
         self.root = parse_robot_xml(description.urdf, "URDF")
+        self.links_without_collision = links_without_collision(self.root)
+        """Links that it draws and gives no collision geometry."""
+        collide_as_drawn(self.root, CollisionFromVisual(description.collision_from_visual))
         self._folders = [resolve_package_dir(folder) for folder in description.package_dirs]
         self._capsules = {name: _rename_capsules(self.root, name) for name in _ELEMENT.values()}
         self.model: pin.Model = _from_urdf(lambda: pin.buildModelFromXML(self._text()))
