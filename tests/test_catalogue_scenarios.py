@@ -3,15 +3,23 @@
 from functools import cache
 
 import pytest
+from click.testing import CliRunner
 
 from densarm.catalogue import scenario_paths
 from densarm.clearance import Clearance
+from densarm.cli.list_known import list_known
 from densarm.closed_loop import simulate
 from densarm.outcome import Outcome
 from densarm.proof.swept_bound import SweptBound
 from densarm.scenario import ControlForm, GuideKind, Scenario, load_scenario
 
 loaded = cache(load_scenario)
+
+
+@cache
+def listed() -> dict[str, list[str]]:
+    lines = CliRunner().invoke(list_known, standalone_mode=False).output.splitlines()
+    return {cells[0]: cells[1:] for line in lines if (cells := line.split())}
 
 
 @pytest.fixture(params=scenario_paths())
@@ -40,6 +48,13 @@ def test_start_and_goal_are_clear_and_the_straight_segment_is_not(scenario):
         angles = arm.angles(q)
         assert ((angles >= arm.limits.lower) & (angles <= arm.limits.upper)).all()
     assert not bound.segment_is_clear(scenario.start, scenario.goal)
+
+
+def test_it_is_listed_with_its_robot_joints_and_pairs(scenario):
+    arm = scenario.arm
+    own = len(arm.collision_model.collisionPairs)
+    others = Clearance(arm, scenario.scene).n_pairs - own
+    assert listed()[scenario.name] == [arm.name, *map(str, (arm.nv, own, others))]
 
 
 def test_kinova_goes_the_short_way_round():

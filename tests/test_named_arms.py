@@ -12,6 +12,7 @@ from densarm.bench.problem_results import run_problem
 from densarm.catalogue import robot_names
 from densarm.clearance import Clearance
 from densarm.outcome import Outcome
+from densarm.robot.outline import robot_outline
 from densarm.robot.robot_description import parse_robot_xml
 from densarm.robot.self_collision import Exclusion
 from densarm.scene import Scene
@@ -63,6 +64,12 @@ def test_every_two_shapes_that_move_against_each_other_are_checked_or_listed(arm
     left_out = {frozenset(pair.shapes) for pair in arm.excluded_pairs}
     assert checked | left_out == moving
     assert not checked & left_out
+
+
+def test_outline_without_meshes_is_that_of_the_arm(arm):
+    moving = [item for item in arm.collision_model.geometryObjects if item.parentJoint > 0]
+    own, left_out = len(arm.collision_model.collisionPairs), len(arm.excluded_pairs)
+    assert robot_outline(arm.description) == (arm.nv, len(moving), own, left_out)
 
 
 def test_every_link_that_is_drawn_can_collide(arm):

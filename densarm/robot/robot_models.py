@@ -15,7 +15,11 @@ from densarm.robot.attached_bodies import (
 )
 from densarm.robot.locked_joints import lock_joints, locked_positions, refuse_mimics
 from densarm.robot.robot_description import RobotDescription
-from densarm.robot.self_collision import ExcludedPair, add_self_collision_pairs
+from densarm.robot.self_collision import (
+    ExcludedPair,
+    add_self_collision_pairs,
+    remove_always_colliding_pairs,
+)
 from densarm.robot.urdf import Urdf
 from densarm.shapes import differentiable_geometry
 from densarm.validation import finite_vector, unit_quaternion
@@ -53,7 +57,7 @@ def build_models(description: RobotDescription) -> RobotModels:
     """
     urdf = Urdf(description)
     try:
-        model, collision = _place(description, urdf, pin.GeometryType.COLLISION)
+        model, collision = placed_models(description, urdf, pin.GeometryType.COLLISION)
         _require_arm(model)
         if collision.ngeoms == 0:
             raise RobotDescriptionError(
@@ -65,6 +69,7 @@ def build_models(description: RobotDescription) -> RobotModels:
     except RobotDescriptionError as error:
         raise _with_advice(error, urdf.links_without_collision) from None
     excluded = add_self_collision_pairs(model, collision, description.srdf)
+    excluded += remove_always_colliding_pairs(model, collision)
     held = description.attachments
     add_attached_shapes(model, collision, held)
     add_attached_pairs(model, collision, held)
@@ -81,7 +86,7 @@ def build_visual_model(description: RobotDescription) -> pin.GeometryModel:
     Raises:
         RobotDescriptionError: a mesh is missing.
     """
-    model, visual = _place(description, Urdf(description), pin.GeometryType.VISUAL)
+    model, visual = placed_models(description, Urdf(description), pin.GeometryType.VISUAL)
     add_attached_shapes(model, visual, description.attachments)
     return visual
 
@@ -117,9 +122,21 @@ def joint_names(description: RobotDescription) -> list[str]:
     return [name for name in list(urdf.model.names)[1:] if name not in locked]
 
 
-def _place(
+def placed_models(
     description: RobotDescription, urdf: Urdf, kind: pin.GeometryType
 ) -> tuple[pin.Model, pin.GeometryModel]:
+    """Return the model without locked joints and the geometry as the URDF has it, on their base.
+
+    Args:
+        description: the arm.
+        urdf: its URDF.
+        kind: collision or visual geometry.
+
+    Raises:
+        RobotDescriptionError: a joint that mimics one that moves, or a mesh that is missing.
+        UnknownNameError: a locked joint that the URDF does not have.
+        InvalidValueError: a locked position or base placement that is not finite.
+    """
     locked = locked_positions(urdf, description.locked_joints)
     refuse_mimics(urdf, locked)
     model, geometry = lock_joints(urdf.model, urdf.geometry(kind), locked)

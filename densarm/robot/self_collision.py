@@ -47,9 +47,8 @@ def add_self_collision_pairs(
 ) -> tuple[ExcludedPair, ...]:
     """Add the self-collision pairs of an arm to its collision model.
 
-    Every two shapes that move against each other make a pair, less those that an `Exclusion` names.
-    The random configurations are the same every time. A pair that never collides stays, since no
-    number of samples proves that it cannot.
+    Every two shapes that move against each other make a pair, less those of neighbours and those
+    that the SRDF disables.
 
     Args:
         model: the arm.
@@ -77,12 +76,31 @@ def add_self_collision_pairs(
             excluded[i, j] = Exclusion.SRDF
         else:
             geometry.addCollisionPair(pin.CollisionPair(i, j))
-    for i, j in _always_colliding(model, geometry):
-        geometry.removeCollisionPair(pin.CollisionPair(i, j))
-        excluded[i, j] = Exclusion.ALWAYS
     return tuple(
         ExcludedPair((items[i].name, items[j].name), reason) for (i, j), reason in excluded.items()
     )
+
+
+def remove_always_colliding_pairs(
+    model: pin.Model, geometry: pin.GeometryModel
+) -> tuple[ExcludedPair, ...]:
+    """Remove the pairs that collide in every random configuration.
+
+    The configurations are the same every time. A pair that never collides stays, since no number of
+    samples proves that it cannot.
+
+    Args:
+        model: the arm.
+        geometry: its collision shapes and pairs; changed.
+
+    Returns:
+        The pairs left out.
+    """
+    names = [item.name for item in geometry.geometryObjects]
+    always = _always_colliding(model, geometry)
+    for i, j in always:
+        geometry.removeCollisionPair(pin.CollisionPair(i, j))
+    return tuple(ExcludedPair((names[i], names[j]), Exclusion.ALWAYS) for i, j in always)
 
 
 def srdf_postures(srdf: str | None) -> dict[str, dict[str, float]]:
