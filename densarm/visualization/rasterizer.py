@@ -34,7 +34,7 @@ class Rasterizer:
         self._image = np.ones((*shape, 3), dtype=np.float32)
         self._nearness = np.zeros(shape, dtype=np.float32)
         self._layer_nearness = np.zeros(shape, dtype=np.float32)
-        self._surface = np.zeros((*shape, 6), dtype=np.float32)
+        self._layer = np.zeros((*shape, 3), dtype=np.float32)
         lights = _LIGHTS[:, :3] / np.linalg.norm(_LIGHTS[:, :3], axis=1, keepdims=True)
         self._lights = np.column_stack([lights @ camera.axes, _LIGHTS[:, 3]])
 
@@ -53,7 +53,11 @@ class Rasterizer:
         """
         corners = self._project(mesh.vertices)
         corners[:, 2] *= lift
-        self._draw(corners, mesh.faces, np.hstack([mesh.normals, _colors(mesh)]), opacity)
+        colors = _colors(mesh)
+        if mesh.normals.any():
+            light, shine = _reflected(mesh.normals, self._lights, self._camera.axes[2])
+            colors = np.minimum(colors * light + shine, 1.0)
+        self._draw(corners, mesh.faces, colors, opacity)
 
     def lines(
         self, ends: Array, color: tuple[float, float, float], width: float, opacity: float
@@ -78,8 +82,7 @@ class Rasterizer:
         corners[:, 2] *= _LINE_LIFT
         halves = np.array([[0, 1, 2], [2, 1, 3]], dtype=np.int64)
         faces = (4 * np.arange(len(ends))[:, np.newaxis, np.newaxis] + halves).reshape(-1, 3)
-        attributes = np.tile([0.0, 0.0, 0.0, *color], (len(corners), 1))
-        self._draw(corners, faces, attributes, opacity)
+        self._draw(corners, faces, np.tile(color, (len(corners), 1)), opacity)
 
     def pixels(self) -> NDArray[np.uint8]:
         """Return the picture (height, width, 3)."""
@@ -103,16 +106,23 @@ class Rasterizer:
         return np.stack([x, y, nearness], axis=-1)
 
     def _draw(
-        self, corners: Array, faces: NDArray[np.int64], attributes: Array, opacity: float
+        self, corners: Array, faces: NDArray[np.int64], colors: Array, opacity: float
     ) -> None:
-        self._layer_nearness[:] = self._nearness
-        rows = _fill(corners, faces, attributes, self._layer_nearness, self._surface)
-        _shade(
-            *rows, self._nearness, self._layer_nearness, self._surface, self._lights,
-            self._camera.axes[2], opacity, self._image,
-        )  # fmt: skip
         if opacity == 1.0:
-            self._nearness[:] = self._layer_nearness
+            _fill(corners, faces, colors, self._nearness, self._image)
+            return
+        part = tuple(map(_reach, (corners[:, 1], corners[:, 0]), self._nearness.shape))
+        self._layer_nearness[part] = self._nearness[part]
+        self._layer[part] = self._image[part]
+        _fill(corners, faces, colors, self._layer_nearness, self._layer)
+        self._image[part] += opacity * (self._layer[part] - self._image[part])
+
+
+def _reach(coordinates: Array, size: int) -> slice:
+    """Return the rows or columns that points reach, of which NaN is behind the camera."""
+    seen = coordinates[np.isfinite(coordinates)]
+    low, high = (seen.min(), seen.max()) if len(seen) else (0.0, 0.0)
+    return slice(int(np.clip(low - 1.0, 0, size)), int(np.clip(high + 1.0, 0, size)))
 
 
 def _colors(mesh: TriangleMesh) -> Array:
@@ -121,25 +131,39 @@ def _colors(mesh: TriangleMesh) -> Array:
     return mesh.colors
 
 
-@compiled
-def _span(low: float, high: float, size: int) -> tuple[int, int]:
-    """Return the range of pixels whose centres are from low to high, inside the picture."""
-    first = int(np.ceil(min(max(low, 0.0), size) - 0.5))
-    last = int(np.floor(min(max(high, 0.0), size) - 0.5))
-    return max(first, 0), last + 1
+def _reflected(normals: Array, lights: Array, to_camera: Array) -> tuple[Array, Array]:
+    """Return how bright surfaces' own colours are and the highlights on them, by Blinn and Phong.
+
+    Args:
+        normals: (N, 3); where one is zero, the colour is left as it is.
+        lights: directions and strength (K, 4).
+        to_camera: direction (3,).
+
+    Returns:
+        Both (N, 1).
+    """
+    length = np.linalg.norm(normals, axis=1, keepdims=True)
+    facing = np.where(normals @ to_camera >= 0.0, 1.0, -1.0)[:, np.newaxis]
+    unit = normals * (facing / np.maximum(length, _UNLIT))
+    middle = lights[:, :3] + to_camera
+    middle /= np.linalg.norm(middle, axis=1, keepdims=True)
+    strength = lights[:, 3:]
+    light = _AMBIENT + np.maximum(unit @ lights[:, :3].T, 0.0) @ strength
+    shine = _SHINE * np.maximum(unit @ middle.T, 0.0) ** _GLOSS @ strength
+    lit = length >= _UNLIT
+    return np.where(lit, light, 1.0), np.where(lit, shine, 0.0)
 
 
 @compiled
 def _fill(
     corners: Array,
     faces: NDArray[np.int64],
-    attributes: Array,
+    colors: Array,
     nearness: NDArray[np.float32],
-    surface: NDArray[np.float32],
-) -> tuple[int, int]:
-    """Write the attributes of the nearest triangle of each pixel; return the rows written to."""
+    image: NDArray[np.float32],
+) -> None:
+    """Write the colour of the nearest triangle of each pixel, and how near it is."""
     height, width = nearness.shape
-    top, bottom = height, 0
     for t in range(faces.shape[0]):
         a, b, c = faces[t, 0], faces[t, 1], faces[t, 2]
         ax, ay, az = corners[a, 0], corners[a, 1], corners[a, 2]
@@ -148,9 +172,11 @@ def _fill(
         area = (bx - ax) * (cy - ay) - (by - ay) * (cx - ax)
         if not abs(area) > 0.0:  # a corner behind the camera is NaN
             continue
-        left, right = _span(min(ax, bx, cx), max(ax, bx, cx), width)
-        first, last = _span(min(ay, by, cy), max(ay, by, cy), height)
-        top, bottom = min(top, first), max(bottom, last)
+        # The pixels whose centres are inside the triangle's rectangle and the picture.
+        left = int(np.ceil(max(min(ax, bx, cx), 0.0) - 0.5))
+        right = int(np.floor(min(max(ax, bx, cx), width) - 0.5)) + 1
+        first = int(np.ceil(max(min(ay, by, cy), 0.0) - 0.5))
+        last = int(np.floor(min(max(ay, by, cy), height) - 0.5)) + 1
         for row in range(first, last):
             y = row + 0.5
             for column in range(left, right):
@@ -163,51 +189,7 @@ def _fill(
                 near = u * az + v * bz + w * cz
                 if near > nearness[row, column]:
                     nearness[row, column] = near
-                    for k in range(attributes.shape[1]):
-                        surface[row, column, k] = (
-                            u * attributes[a, k] + v * attributes[b, k] + w * attributes[c, k]
+                    for k in range(3):
+                        image[row, column, k] = (
+                            u * colors[a, k] + v * colors[b, k] + w * colors[c, k]
                         )
-    return top, bottom
-
-
-@compiled
-def _reflected(normal: NDArray[np.float32], lights: Array, to_camera: Array) -> tuple[float, float]:
-    """Return how bright a surface's own colour is, and the highlight on it, by Blinn and Phong."""
-    length = np.sqrt(normal[0] ** 2 + normal[1] ** 2 + normal[2] ** 2)
-    if length < _UNLIT:
-        return 1.0, 0.0
-    facing = normal[0] * to_camera[0] + normal[1] * to_camera[1] + normal[2] * to_camera[2]
-    side = (1.0 if facing >= 0.0 else -1.0) / length
-    light, shine = _AMBIENT, 0.0
-    for k in range(lights.shape[0]):
-        cosine, middle, half = 0.0, 0.0, 0.0
-        for axis in range(3):
-            cosine += side * normal[axis] * lights[k, axis]
-            middle += (lights[k, axis] + to_camera[axis]) ** 2
-            half += side * normal[axis] * (lights[k, axis] + to_camera[axis])
-        light += lights[k, 3] * max(cosine, 0.0)
-        shine += lights[k, 3] * _SHINE * max(half / np.sqrt(middle), 0.0) ** _GLOSS
-    return light, shine
-
-
-@compiled
-def _shade(
-    top: int,
-    bottom: int,
-    before: NDArray[np.float32],
-    after: NDArray[np.float32],
-    surface: NDArray[np.float32],
-    lights: Array,
-    to_camera: Array,
-    opacity: float,
-    image: NDArray[np.float32],
-) -> None:
-    """Blend the light that new pixels send to the camera into the image."""
-    for row in range(top, bottom):
-        for column in range(image.shape[1]):
-            if after[row, column] <= before[row, column]:
-                continue
-            light, shine = _reflected(surface[row, column, :3], lights, to_camera)
-            for channel in range(3):
-                color = min(1.0, surface[row, column, 3 + channel] * light + shine)
-                image[row, column, channel] += opacity * (color - image[row, column, channel])
