@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from densarm.arm import Arm, load_arm
-from densarm.bench.problem import random_problems
 from densarm.bench.problem_results import run_problem
+from densarm.bench.random_problems import random_problems
 from densarm.catalogue import robot_names
 from densarm.clearance import Clearance
 from densarm.outcome import Outcome
@@ -91,5 +91,5 @@ def test_no_named_arm_needs_a_pair_left_out_since_it_always_collides(arm):
     ("name", "seed"), [("three_link", 2), ("xarm7", 1), ("z1", 1), ("ur5", 2), ("kinova", 1)]
 )
 def test_between_random_configurations(name, seed):
-    result = run_problem(random_problems(name, 1, seed)[0])
+    result = run_problem(random_problems(name, 1, seed, "none")[0])
     assert (result.outcome, result.certified) == (Outcome.REACHED, True), result.detail

@@ -4,16 +4,11 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import lru_cache
 
-import numpy as np
-
 from densarm.arm import Arm, load_arm
-from densarm.clear_configurations import clear_configurations
-from densarm.clearance import Clearance
 from densarm.errors import InvalidValueError
 from densarm.scenario import Scenario
 from densarm.scene import Scene
 from densarm.scene_files import MotionProblem
-from densarm.validation import non_negative_integer, positive_integer
 
 
 @dataclass(frozen=True)
@@ -42,7 +37,7 @@ class Problem:
         Raises:
             UnknownNameError: no such arm, or joint to lock.
         """
-        arm = _arm(self.arm, self.locked_joints)
+        arm = named_arm(self.arm, self.locked_joints)
         name = f"{self.arm}_{self.scene_name}_{self.index}"
         return Scenario(
             name=name,
@@ -56,7 +51,16 @@ class Problem:
 
 
 @lru_cache(maxsize=1)
-def _arm(name: str, locked_joints: tuple[tuple[str, float], ...] = ()) -> Arm:
+def named_arm(name: str, locked_joints: tuple[tuple[str, float], ...] = ()) -> Arm:
+    """Return an arm by its name, the same one when it is asked for again.
+
+    Args:
+        name: a known name.
+        locked_joints: names and positions of joints that stand still [rad or m].
+
+    Raises:
+        UnknownNameError: no such arm, or joint to lock.
+    """
     return load_arm(name, locked_joints=dict(locked_joints))
 
 
@@ -75,7 +79,7 @@ def as_problems(collection: Iterable[MotionProblem]) -> list[Problem]:
 
 def _of_collection(problem: MotionProblem) -> Problem:
     locked = tuple(sorted(problem.locked_joints.items()))
-    names = _arm(problem.robot, locked).joint_names
+    names = named_arm(problem.robot, locked).joint_names
     if sorted(problem.joints) != sorted(names):
         allowed = f"the joints of {problem.robot}, {', '.join(names)}"
         raise InvalidValueError("metadata.joints", list(problem.joints), allowed)
@@ -89,28 +93,3 @@ def _of_collection(problem: MotionProblem) -> Problem:
         goal=tuple(problem.goal[k] for k in order),
         locked_joints=locked,
     )
-
-
-def random_problems(arm: str, count: int, seed: int) -> list[Problem]:
-    """Draw problems without obstacles, in which an arm may collide with itself alone.
-
-    Starts and goals are drawn evenly within the position limits, continuous joints from a whole
-    turn, until nothing touches. The first problems stay the same when more are drawn.
-
-    Args:
-        arm: a known name.
-        count: number of problems.
-        seed: of the draws and of the planner.
-
-    Raises:
-        UnknownNameError: no such arm.
-        InvalidValueError: a number of problems below one, or a seed that is not a whole number.
-        DensarmError: almost no configuration is clear.
-    """
-    positive_integer("problems", count)
-    non_negative_integer("seed", seed)
-    loaded, scene = _arm(arm), Scene([])
-    ends = clear_configurations(Clearance(loaded, scene), 2 * count, seed)
-    angles = [tuple(row) for row in loaded.angles(np.array(ends)).tolist()]
-    pairs = zip(angles[::2], angles[1::2], strict=True)
-    return [Problem(arm, "empty", k, scene, *pair, seed) for k, pair in enumerate(pairs)]

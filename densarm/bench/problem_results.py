@@ -1,53 +1,36 @@
 """Problems run one by one or in several processes, and what came of them."""
 
-import signal
-from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, fields, replace
 from functools import partial
-from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from densarm.bench.motion_time import motion_time, time_optimal
 from densarm.bench.problem import Problem
+from densarm.bench.problem_result import ProblemResult
+from densarm.bench.processes import in_processes
 from densarm.closed_loop import simulate
 from densarm.errors import FileContentError
 from densarm.outcome import FAILED, RUN_ENDS, Outcome
 from densarm.scenario import GuideKind
 from densarm.trajectory import Trajectory
-from densarm.validation import positive_integer
 
 PERCENTILES = (50, 95, 98)
 
+MEASURES = (
+    "plan_time_s",
+    "first_motion_s",
+    "duration_s",
+    "motion_s",
+    "optimal_ratio",
+    "path_length_rad",
+)
+"""What percentiles are taken of, as `ProblemResult` calls it."""
 
-@dataclass(frozen=True)
-class ProblemResult:
-    """How one problem's run ended."""
-
-    scene: str
-    """The set that the problem belongs to."""
-    index: int
-    """Its place in the set."""
-    outcome: str
-    """One of `RUN_ENDS`."""
-    detail: str = ""
-    """What stood in the way, as a phrase."""
-    duration_s: float | None = None
-    """Simulated time [s]; None where nothing ran, as in what follows."""
-    min_clearance_m: float | None = None
-    """Smallest signed distance [m]; None without pairs."""
-    goal_error_rad: float | None = None
-    """Largest joint error at the end [rad or m]."""
-    peak_torque_ratio: float | None = None
-    """Largest torque in units of its limit."""
-    plan_time_s: float | None = None
-    """Wall-clock time of planning [s]."""
-    path_length_rad: float | None = None
-    """Length of the way in joint space [rad or m]."""
-    certified: bool = False
-    """Whether the certificate holds in every part."""
+_FIELDS = {field.name for field in fields(ProblemResult)}
 
 
 @dataclass(frozen=True)
@@ -72,34 +55,45 @@ class ProblemResults:
         found = [r.min_clearance_m for r in self.results if r.min_clearance_m is not None]
         return min(found, default=None)
 
-    def by_scene(self) -> "dict[str, ProblemResults]":
-        """Return the results of each set of problems, by its name."""
-        names = dict.fromkeys(r.scene for r in self.results)
-        return {
-            name: ProblemResults(tuple(r for r in self.results if r.scene == name))
-            for name in names
-        }
+    @property
+    def sets(self) -> tuple[str, ...]:
+        """Names of the sets that the problems belong to."""
+        return tuple(dict.fromkeys(result.scene for result in self.results))
+
+    def of(self, scene: str | None) -> "ProblemResults":
+        """Return the results of one set of problems; of all without a name."""
+        return ProblemResults(tuple(r for r in self.results if scene in (None, r.scene)))
 
     def count(self, outcome: str) -> int:
         """Return the number of runs that ended so."""
         return sum(r.outcome == outcome for r in self.results)
 
     def percentiles(self, measure: str) -> list[float] | None:
-        """Return the `PERCENTILES` of a measure over the runs that reached the goal, if any."""
+        """Return the `PERCENTILES` of a measure over the runs that reached the goal, if any.
+
+        Args:
+            measure: one of `MEASURES`; runs in which it is not known do not count.
+        """
         reached = [getattr(r, measure) for r in self.results if r.outcome == Outcome.REACHED]
-        return np.percentile(reached, PERCENTILES).tolist() if reached else None
+        known = [value for value in reached if value is not None]
+        return np.percentile(known, PERCENTILES).tolist() if known else None
 
     def to_json(self) -> dict[str, Any]:
-        """Return JSON data."""
+        """Return JSON data: every problem, the figures of all, and those of each set."""
         return {
             "problems": [dict(vars(result)) for result in self.results],
+            **self.figures(),
+            "sets": {name: self.of(name).figures() for name in self.sets},
+        }
+
+    def figures(self) -> dict[str, Any]:
+        """Return counts, and the `PERCENTILES` of each measure, as JSON data."""
+        return {
             "reached": self.count(Outcome.REACHED),
             "certified": self.certified,
             "total": self.total,
             "outcomes": {outcome: self.count(outcome) for outcome in RUN_ENDS},
-            "plan_time_s": self.percentiles("plan_time_s"),
-            "duration_s": self.percentiles("duration_s"),
-            "path_length_rad": self.percentiles("path_length_rad"),
+            **{measure: self.percentiles(measure) for measure in MEASURES},
             "min_clearance_m": self.min_clearance,
         }
 
@@ -113,6 +107,8 @@ class RunOptions:
     save_dir: Path | None = None
     """Folder of the recorded runs, SCENE_INDEX.npz; a problem whose record is there already is
     not run again. None to keep none."""
+    time_optimal: bool = False
+    """Whether to compute the shortest time along each run's path."""
 
 
 def run_problems(
@@ -138,41 +134,33 @@ def run_problems(
     """
     results = []
     run = partial(run_problem, options=options)
-    for result in _results(run, problems, positive_integer("jobs", jobs)):
+    for result in in_processes(run, problems, jobs):
         results.append(result)
         on_progress(f"{len(results)} of {len(problems)} problems run")
     return ProblemResults(tuple(results))
 
 
-def _results(
-    run: Callable[[Problem], ProblemResult], problems: Sequence[Problem], jobs: int
-) -> Iterator[ProblemResult]:
-    if jobs == 1:
-        yield from map(run, problems)
-        return
-    # Ctrl-C reaches the whole group of processes: it ends these at once, and only this one tells.
-    pool = ProcessPoolExecutor(
-        jobs, get_context("spawn"), signal.signal, (signal.SIGINT, signal.SIG_DFL)
-    )
-    try:
-        yield from pool.map(run, problems)
-    finally:
-        pool.shutdown(cancel_futures=True)
-
-
 def run_problem(problem: Problem, options: RunOptions | None = None) -> ProblemResult:
     """Plan a problem, run its closed loop and prove it; an error becomes a result."""
     try:
-        run = _run(problem, options or RunOptions())
-        return ProblemResult(
-            problem.scene_name,
-            problem.index,
-            detail=run.detail,
-            path_length_rad=_path_length(run),
-            **run.summary(),
-        )
+        options = options or RunOptions()
+        return _result(problem, _run(problem, options), options)
     except (ValueError, ArithmeticError, RuntimeError) as error:
         return ProblemResult(problem.scene_name, problem.index, FAILED, str(error))
+
+
+def _result(problem: Problem, run: Trajectory, options: RunOptions) -> ProblemResult:
+    steps = run.scenario.arm.difference(run.q[:-1], run.q[1:])
+    reached = run.outcome == Outcome.REACHED
+    return ProblemResult(
+        scene=problem.scene_name,
+        index=problem.index,
+        detail=run.detail,
+        motion_s=motion_time(run) if reached else None,
+        optimal_s=time_optimal(run) if reached and options.time_optimal else None,
+        path_length_rad=float(np.linalg.norm(steps, axis=1).sum()),
+        **{key: value for key, value in run.summary().items() if key in _FIELDS},
+    )
 
 
 def _run(problem: Problem, options: RunOptions) -> Trajectory:
@@ -190,8 +178,3 @@ def _run(problem: Problem, options: RunOptions) -> Trajectory:
     run = simulate(scenario)
     run.save(file)
     return run
-
-
-def _path_length(run: Trajectory) -> float:
-    steps = run.scenario.arm.difference(run.q[:-1], run.q[1:])
-    return float(np.linalg.norm(steps, axis=1).sum())

@@ -1,6 +1,11 @@
 """``densarm bench``: benchmarks."""
 
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -9,6 +14,10 @@ from densarm.cli.json_file import write_json
 from densarm.cli.output_option import output_option
 from densarm.cli.progress import progress
 from densarm.errors import FileContentError
+
+if TYPE_CHECKING:
+    from densarm.bench.problem import Problem
+    from densarm.bench.problem_results import ProblemResults
 
 
 @click.group(no_args_is_help=False)
@@ -65,8 +74,45 @@ def step(arm: str, shapes: str, pairs: int, json: Path | None) -> int:
     return ExitStatus.SUCCESS
 
 
+def _set_options(command: Callable[..., int]) -> Callable[..., int]:
+    """Add the options of commands that run a set of problems."""
+    options = (
+        click.option(
+            "--guide",
+            type=click.Choice(["path", "direct", "both"]),
+            default="path",
+            show_default=True,
+            help="What supplies the sub-goals; both: path, and what direct reaches beside it.",
+        ),
+        click.option(
+            "--time-optimal",
+            is_flag=True,
+            help="Compare each motion with the fastest along its path, by TOPP-RA.",
+        ),
+        click.option(
+            "--jobs", type=click.IntRange(min=1), default=1, show_default=True, help="Processes."
+        ),
+        click.option(
+            "--save-dir",
+            type=click.Path(path_type=Path, file_okay=False),
+            help="Keep every run here; those that are here already are not run again.",
+        ),
+        output_option("--json", "FILE", "Write every problem's result and the figures as JSON."),
+    )
+    for option in reversed(options):
+        command = option(command)
+    return command
+
+
 @bench.command("random")
 @click.option("--arm", default="panda", show_default=True, help="A name of `densarm list`.")
+@click.option(
+    "--scenes",
+    type=click.Choice(["mixed", "spheres", "boxes", "wall", "shelf", "none"]),
+    default="mixed",
+    show_default=True,
+    help="What is in the way; mixed: the next four in turn.",
+)
 @click.option(
     "--problems",
     type=click.IntRange(min=1),
@@ -79,41 +125,39 @@ def step(arm: str, shapes: str, pairs: int, json: Path | None) -> int:
     type=click.IntRange(min=0),
     default=0,
     show_default=True,
-    help="Seed of starts, goals and the planner.",
+    help="Seed of scenes, starts, goals and the planner.",
 )
-@click.option("--jobs", type=click.IntRange(min=1), default=1, show_default=True, help="Processes.")
-@output_option("--json", "FILE", "Write every problem's result and the figures as JSON.")
-def random(arm: str, problems: int, seed: int, jobs: int, json: Path | None) -> int:
-    """Move an arm between random configurations, with nothing but itself in its way.
+@_set_options
+def random(
+    arm: str,
+    scenes: str,
+    problems: int,
+    seed: int,
+    jobs: int,
+    **options: Any,
+) -> int:
+    """Move an arm between random configurations among random obstacles.
 
-    Starts and goals are drawn evenly within the position limits, continuous joints from a whole
-    turn, and touch nothing. Each problem is planned, run as a torque-driven closed loop, and
-    proved.
+    Spheres, boxes, a wall with a gap or a shelf, in proportion to the arm's reach. Starts and
+    goals are drawn evenly within the position limits, continuous joints from a whole turn, and
+    touch nothing; a problem is kept if a longer search than the default finds a path. Each is
+    planned, run as a torque-driven closed loop, and proved.
 
     The exit status is 0 when all problems were run, whatever was reached.
 
     \b
     Example:
       densarm bench random --arm ur5 --problems 50 --jobs 2 --json random.json
+      densarm bench random --arm ur5 --problems 50 --scenes none
     """  # noqa: D301
     with progress() as report:
         report("loading")
-        from densarm.bench.problem import random_problems
-        from densarm.bench.problem_results import run_problems
-        from densarm.cli.problem_table import print_problems
+        from densarm.bench.random_problems import random_problems
 
-        results = run_problems(random_problems(arm, problems, seed), jobs, report)
-        if json:
-            write_json(json, results.to_json())
-    print_problems(results)
+        chosen = random_problems(arm, problems, seed, scenes, jobs, report)
+        finish = _run_set(chosen, report, jobs=jobs, **options)
+    finish()
     return ExitStatus.SUCCESS
-
-
-def _make_folder(path: Path) -> None:
-    try:
-        path.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise FileContentError(path, error.strerror or "cannot be made") from None
 
 
 @bench.command()
@@ -130,23 +174,8 @@ def _make_folder(path: Path) -> None:
     show_default=True,
     help="Run one problem of so many.",
 )
-@click.option(
-    "--guide",
-    type=click.Choice(["path", "direct"]),
-    default="path",
-    show_default=True,
-    help="What supplies the sub-goals.",
-)
-@click.option("--jobs", type=click.IntRange(min=1), default=1, show_default=True, help="Processes.")
-@click.option(
-    "--save-dir",
-    type=click.Path(path_type=Path, file_okay=False),
-    help="Keep every run here; those that are here already are not run again.",
-)
-@output_option("--json", "FILE", "Write every problem's result and the figures as JSON.")
-def motionbenchmaker(
-    problems: Path, every: int, guide: str, jobs: int, save_dir: Path | None, json: Path | None
-) -> int:
+@_set_options
+def motionbenchmaker(problems: Path, every: int, **options: Any) -> int:
     """Run problems of MotionBenchMaker's collection.
 
     Each problem is planned, run as a torque-driven closed loop, and proved. An interrupted
@@ -161,16 +190,44 @@ def motionbenchmaker(
     with progress() as report:
         report("loading")
         from densarm.bench.problem import as_problems
-        from densarm.bench.problem_results import RunOptions, run_problems
-        from densarm.cli.problem_table import print_problem_sets
-        from densarm.scenario import GuideKind
         from densarm.scene_files import load_problems
 
         chosen = as_problems(load_problems(problems)[::every])
-        if save_dir:
-            _make_folder(save_dir)
-        results = run_problems(chosen, jobs, report, RunOptions(GuideKind(guide), save_dir))
-        if json:
-            write_json(json, results.to_json())
-    print_problem_sets(results)
+        finish = _run_set(chosen, report, **options)
+    finish()
     return ExitStatus.SUCCESS
+
+
+def _run_set(
+    problems: Sequence[Problem],
+    report: Callable[[str], None],
+    *,
+    guide: str,
+    time_optimal: bool,
+    jobs: int,
+    save_dir: Path | None,
+    json: Path | None,
+) -> Callable[[], None]:
+    """Run problems and write what came of them; return what prints it."""
+    from densarm.bench.problem_results import RunOptions, run_problems
+    from densarm.cli.problem_table import print_problem_sets
+    from densarm.scenario import GuideKind
+
+    def run(kind: GuideKind, folder: Path | None) -> ProblemResults:
+        if folder:
+            _make_folder(folder)
+        return run_problems(problems, jobs, report, RunOptions(kind, folder, time_optimal))
+
+    results = run(GuideKind("path" if guide == "both" else guide), save_dir)
+    direct = run(GuideKind.DIRECT, save_dir and save_dir / "direct") if guide == "both" else None
+    if json:
+        beside = {"direct": direct.to_json()} if direct else {}
+        write_json(json, {**results.to_json(), **beside})
+    return partial(print_problem_sets, results, direct)
+
+
+def _make_folder(path: Path) -> None:
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise FileContentError(path, error.strerror or "cannot be made") from None

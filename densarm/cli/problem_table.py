@@ -2,45 +2,36 @@
 
 import click
 
-from densarm.bench.problem_results import PERCENTILES, ProblemResults
-from densarm.outcome import RUN_ENDS, Outcome
+from densarm.bench.problem_results import ProblemResults
+from densarm.outcome import Outcome
 
-_COLUMN = 18  # characters
-
-_SET_OUTCOMES = (Outcome.REACHED, Outcome.COLLIDED, Outcome.STUCK, Outcome.NO_PATH)
-_SET_COLUMNS = (
+_COUNTED = (Outcome.COLLIDED, Outcome.STUCK, Outcome.NO_PATH)
+_COLUMNS = (
     "reach-\ned",
+    "certi-\nfied",
     "colli-\nded",
     "stuck",
     "no\npath",
     "else",
-    "certi-\nfied",
     "of",
     "planning\n[s]",
+    "first\nmotion",
     "motion\n[s]",
+    "/ opti-\nmal",
     "path\n[rad]",
     "clear\n[mm]",
+    "di-\nrect",
 )
-_SET_WIDTH = 96  # characters, at least
+_WIDTH = 110  # characters, at least
 
 
-def print_problems(results: ProblemResults) -> None:
-    """Print how the runs ended, the percentiles of their times, and what was not reached."""
-    for outcome in RUN_ENDS:
-        _print(outcome, f"{results.count(outcome)} of {results.total}")
-    _print("certified", f"{results.certified} of {results.total}")
-    for label, measure in {"planning": "plan_time_s", "motion": "duration_s"}.items():
-        if values := results.percentiles(measure):
-            times = ", ".join(f"{value:.2f}" for value in values)
-            shares = ", ".join(str(share) for share in PERCENTILES)
-            _print(label, f"{times} s ({shares} %)")
-    smallest = results.min_clearance
-    _print("min clearance", "no pairs" if smallest is None else f"{smallest * 1e3:.4g} mm")
-    _print_unsolved(results)
+def print_problem_sets(results: ProblemResults, direct: ProblemResults | None = None) -> None:
+    """Print one row a set of problems: how its runs ended, and percentiles of their measures.
 
-
-def print_problem_sets(results: ProblemResults) -> None:
-    """Print one row a set of problems: how its runs ended, and percentiles of their measures."""
+    Args:
+        results: of all sets.
+        direct: of the same problems without a planner, if they were run so too.
+    """
     from rich.box import SIMPLE
     from rich.console import Console
     from rich.table import Table
@@ -53,27 +44,37 @@ def print_problem_sets(results: ProblemResults) -> None:
         show_edge=False,
         caption_justify="left",
     )
+    rows = {
+        name: _row(results.of(name), direct and direct.of(name)) for name in (*results.sets, None)
+    }
+    shown = [column for column in range(len(_COLUMNS)) if any(row[column] for row in rows.values())]
     table.add_column("set", no_wrap=True)
-    for heading in _SET_COLUMNS:
-        table.add_column(Text(heading), justify="right")
-    for name, part in {**results.by_scene(), "all": results}.items():
-        table.add_row(name, *_set_row(part))
-    Console(width=max(Console().width, _SET_WIDTH), highlight=False).print(table)
+    for column in shown:
+        table.add_column(Text(_COLUMNS[column]), justify="right")
+    for name, row in rows.items():
+        table.add_row(name or "all", *(row[column] for column in shown))
+    Console(width=max(Console().width, _WIDTH), highlight=False).print(table)
     _print_unsolved(results)
 
 
-def _set_row(part: ProblemResults) -> list[str]:
+def _row(part: ProblemResults, direct: ProblemResults | None) -> list[str]:
     planning = part.percentiles("plan_time_s") or []
     smallest = part.min_clearance
+    counts = [part.count(outcome) for outcome in _COUNTED]
+    reached = part.count(Outcome.REACHED)
     return [
-        *(str(part.count(outcome)) for outcome in _SET_OUTCOMES),
-        str(part.total - sum(part.count(outcome) for outcome in _SET_OUTCOMES)),
+        str(reached),
         str(part.certified),
+        *map(str, counts),
+        str(part.total - reached - sum(counts)),
         str(part.total),
         " ".join(f"{value:.2f}" for value in planning),
-        _median(part, "duration_s"),
+        _median(part, "first_motion_s"),
+        _median(part, "motion_s"),
+        _median(part, "optimal_ratio"),
         _median(part, "path_length_rad"),
         "" if smallest is None else f"{smallest * 1e3:.1f}",
+        "" if direct is None else str(direct.count(Outcome.REACHED)),
     ]
 
 
@@ -88,7 +89,3 @@ def _print_unsolved(results: ProblemResults) -> None:
             word = "not certified" if result.outcome == Outcome.REACHED else result.outcome
             detail = f": {result.detail}" if result.detail else ""
             click.echo(f"{result.scene} {result.index} {word}{detail}")
-
-
-def _print(label: str, value: str) -> None:
-    click.echo(f"{label:<{_COLUMN}}{value}")

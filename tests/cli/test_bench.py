@@ -3,7 +3,7 @@ import json
 import numpy as np
 import pytest
 
-from densarm.bench.problem_results import ProblemResult
+from densarm.bench.problem_result import ProblemResult
 from densarm.trajectory import Trajectory
 
 GOAL = [np.cos(0.5), np.sin(0.5)]  # of the shoulder
@@ -23,14 +23,21 @@ def test_step_reports_its_keys(command, tmp_path, arm, pairs):
     assert f"{data['ratio']:.2f}" in done.out
 
 
+RANDOM = ("bench", "random", "--arm", "two_link", "--problems", 1, "--scenes", "none")
+
+
 def test_random_problems_are_counted_and_written(command, tmp_path):
     path = tmp_path / "random.json"
-    done = command("bench", "random", "--arm", "two_link", "--problems", 1, "--json", path)
+    done = command(*RANDOM, "--guide", "both", "--time-optimal", "--json", path)
     assert (done.status, done.err) == (0, "")
     data = json.loads(path.read_text(encoding="utf-8"))
     assert (data["reached"], data["certified"], data["total"]) == (1, 1, 1)
-    lines = {tuple(line.split()) for line in done.out.splitlines()}
-    assert {("reached", "1", "of", "1"), ("certified", "1", "of", "1")} <= lines
+    assert data["direct"]["total"] == 1
+    assert data["optimal_ratio"][0] > 1.0
+    assert f"{data['optimal_ratio'][0]:.2f}" in done.out
+    rows = [line.split()[:2] for line in done.out.splitlines()]
+    assert ["empty", "1"] in rows
+    assert ["all", "1"] in rows
 
 
 def test_problems_that_were_not_solved_are_named(command, monkeypatch):
@@ -38,10 +45,16 @@ def test_problems_that_were_not_solved_are_named(command, monkeypatch):
         "densarm.bench.problem_results.run_problem",
         lambda problem, **_: ProblemResult("empty", problem.index, "no_path", "walls all round"),
     )
-    done = command("bench", "random", "--arm", "two_link", "--problems", 1)
+    done = command(*RANDOM)
     assert done.status == 0
     assert "empty 0 no_path: walls all round" in done.out
-    assert "reached           0 of 1" in done.out
+    assert ["all", "0", "0", "0", "0", "1"] in [line.split()[:6] for line in done.out.splitlines()]
+
+
+def test_scenes_that_do_not_exist(command):
+    done = command("bench", "random", "--scenes", "fog")
+    assert done.status == 2
+    assert "shelf" in done.err
 
 
 @pytest.fixture
