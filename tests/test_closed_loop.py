@@ -53,7 +53,7 @@ def test_direct_from_the_start_of_swing_up_is_stuck_at_a_critical_point(swing_up
     scenario = replace(swing_up, control=replace(swing_up.control, form=form))
     run = simulate(scenario, guide="direct")
     assert run.outcome == Outcome.STUCK
-    assert run.detail.startswith("critical point of the density at joint positions (0, 0)")
+    assert run.detail.startswith("saddle of the density at joint positions (0, 0)")
     assert run.plan_time == 0.0
     assert not run.certified
 
@@ -67,6 +67,7 @@ def test_stuck_names_what_blocks(swing_up, form):
     )
     run = simulate(scenario, guide="direct")
     assert run.outcome == Outcome.STUCK
+    assert run.detail.startswith("maximum of the density")
     assert "lower_link_0 and right" in run.detail
     assert (run.clearance > 0.0).all()
     checks = {check.name: check.holds for check in run.verify().checks}

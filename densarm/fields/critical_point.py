@@ -1,13 +1,21 @@
-"""Critical points of a density on Rⁿ: found by Newton's method, told apart by the Hessian."""
+"""Critical points of a density: found by Newton's method, told apart by the Hessian."""
 
 from dataclasses import dataclass
 from enum import StrEnum
+from typing import Protocol
 
 import numpy as np
 
 from densarm.arrays import Array
-from densarm.density.euclidean_density import EuclideanDensity
 from densarm.density.gauge import Gauge
+
+
+class LogDensity(Protocol):
+    """A density on Rⁿ, or one in coordinates around a configuration."""
+
+    def gradient(self, x: Array, gauge: Gauge) -> Array:
+        """Return the gradient in a gauge at points `x` (..., n)."""
+        ...
 
 
 class CriticalKind(StrEnum):
@@ -20,7 +28,7 @@ class CriticalKind(StrEnum):
     MINIMUM = "minimum"
     """All positive."""
     DEGENERATE = "degenerate"
-    """Some zero to the accuracy of the differences."""
+    """Some zero to the accuracy of the differences, which leave the others possible."""
 
 
 @dataclass(frozen=True)
@@ -38,7 +46,7 @@ class CriticalPoint:
 
 
 def find_critical_point(
-    density: EuclideanDensity, guess: Array, step: float = 1e-5, iterations: int = 50
+    density: LogDensity, guess: Array, step: float = 1e-5, iterations: int = 50
 ) -> CriticalPoint:
     r"""Solve ∇ ln ρ = 0 by Newton's method.
 
@@ -65,12 +73,15 @@ def find_critical_point(
         x = x + move * min(1.0, LONGEST_MOVE / max(length, 1e-300))
         if length < 1e-14:
             break
-    eigenvalues: Array = np.linalg.eigvalsh(log_hessian(density, x, step)).astype(np.float64)
+    hessian, coarse = log_hessian(density, x, step), log_hessian(density, x, 2.0 * step)
+    values, vectors = np.linalg.eigh(hessian)
+    eigenvalues: Array = values.astype(np.float64)
+    error = np.abs(((coarse - hessian) @ vectors * vectors).sum(axis=0))
     slope = float(np.linalg.norm(density.gradient(x, Gauge.LOG)))
-    return CriticalPoint(x, slope, eigenvalues, _kind(eigenvalues))
+    return CriticalPoint(x, slope, eigenvalues, _kind(eigenvalues, error))
 
 
-def log_hessian(density: EuclideanDensity, x: Array, step: float = 1e-5) -> Array:
+def log_hessian(density: LogDensity, x: Array, step: float = 1e-5) -> Array:
     """Return the Hessian of ln ρ at `x` (n,) by central differences of its gradient, (n, n)."""
     axes = step * np.eye(x.size)
     ahead, behind = (density.gradient(x + sign * axes, Gauge.LOG) for sign in (1.0, -1.0))
@@ -78,12 +89,15 @@ def log_hessian(density: EuclideanDensity, x: Array, step: float = 1e-5) -> Arra
     return 0.5 * (hessian + hessian.T)
 
 
-def _kind(eigenvalues: Array) -> CriticalKind:
-    if np.abs(eigenvalues).min() <= 1e-6 * np.abs(eigenvalues).max():
+def _kind(eigenvalues: Array, error: Array) -> CriticalKind:
+    """Return what eigenvalues tell whose errors to first order are given."""
+    zero = np.abs(eigenvalues) <= np.maximum(3.0 * error, 1e-9 * np.abs(eigenvalues).max())
+    rises, falls = (eigenvalues > 0.0) & ~zero, (eigenvalues < 0.0) & ~zero
+    if rises.any() and falls.any():
+        return CriticalKind.SADDLE
+    if zero.any():
         return CriticalKind.DEGENERATE
-    if eigenvalues[0] > 0.0:
-        return CriticalKind.MINIMUM
-    return CriticalKind.MAXIMUM if eigenvalues[-1] < 0.0 else CriticalKind.SADDLE
+    return CriticalKind.MINIMUM if rises.any() else CriticalKind.MAXIMUM
 
 
 LONGEST_MOVE = 0.1

@@ -12,6 +12,7 @@ from densarm.density import (
     NavigationDensity,
     TorusDistance,
 )
+from densarm.fields.stall import find_stall
 from densarm.fields.sub_goal_chain import SubGoalChain
 
 CRITICAL_SLOPE = 1e-9
@@ -44,7 +45,6 @@ class GuidedDensity:
         arm = clearance.arm
         self.chain = chain
         self.clearance = clearance
-        self._margin = margin
         self._log_gradient = np.zeros(arm.nv)
         self._clearance_set = ClearanceSet(clearance, margin, chain.sensing_distance[1])
         self.goal_distance = TorusDistance(arm, chain.q[1], weights, kappa)
@@ -102,20 +102,8 @@ class GuidedDensity:
 
     def describe_stall(self, q: Array) -> str:
         """Return, as a phrase, why the density leads nowhere from q (nq,), and what blocks it."""
-        self.density.update(q)
-        kind = "critical point of" if self.is_critical() else "no ascent along"
-        where = ", ".join(f"{angle:.4g}" for angle in self.clearance.arm.angles(q))
-        blocking = [" and ".join(pair) for pair in self.blocking_pairs()[:5]]
-        return (
-            f"{kind} the density at joint positions ({where}), where |grad ln rho| = "
-            f"{self.slope():.2g}; sensed there: {', '.join(blocking) or 'no pair'}"
-        )
-
-    def blocking_pairs(self) -> list[tuple[str, str]]:
-        """Return the pairs inside their sensing regions at the last update, nearest first."""
-        distance = self.clearance.distance
-        sensed = np.flatnonzero(distance - self._margin < self._clearance_set.sensing_distance)
-        return [self.clearance.pairs[k] for k in sensed[np.argsort(distance[sensed])]]
+        limits = self.chain.joint_sensing_distance
+        return find_stall(self.density, self._clearance_set, limits, q).description
 
     def _point_at_sub_goal(self) -> None:
         current = self.chain.current

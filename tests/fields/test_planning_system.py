@@ -36,8 +36,8 @@ def test_start_of_swing_up_is_a_critical_point(make_guided):
     curve = PlanningSystem(guided, bound).integrate(guided.chain.q[0])
     assert not curve.reached
     assert len(curve.q) == 1
-    assert "critical point of the density at joint positions (0, 0)" in curve.detail
-    assert "no pair" in curve.detail
+    assert "saddle of the density at joint positions (0, 0)" in curve.detail
+    assert "nothing sensed there" in curve.detail
 
 
 def test_spurious_maximum_names_what_blocks(make_guided):
