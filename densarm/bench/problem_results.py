@@ -142,25 +142,37 @@ def run_problems(
 
 def run_problem(problem: Problem, options: RunOptions | None = None) -> ProblemResult:
     """Plan a problem, run its closed loop and prove it; an error becomes a result."""
+    options = options or RunOptions()
+    run = partial(_run, problem, options)
+    return problem_result(problem.scene_name, problem.index, run, options.time_optimal)
+
+
+def problem_result(
+    scene: str, index: int, simulate: Callable[[], Trajectory], is_compared: bool = False
+) -> ProblemResult:
+    """Return how a run ends; an error becomes a result.
+
+    Args:
+        scene: the set that the problem belongs to.
+        index: its place in the set.
+        simulate: runs it.
+        is_compared: whether to compute the shortest time along the run's path.
+    """
     try:
-        options = options or RunOptions()
-        return _result(problem, _run(problem, options), options)
+        run = simulate()
+        steps = run.scenario.arm.difference(run.q[:-1], run.q[1:])
+        reached = run.outcome == Outcome.REACHED
+        return ProblemResult(
+            scene=scene,
+            index=index,
+            detail=run.detail,
+            motion_s=motion_time(run) if reached else None,
+            optimal_s=time_optimal(run) if reached and is_compared else None,
+            path_length_rad=float(np.linalg.norm(steps, axis=1).sum()),
+            **{key: value for key, value in run.summary().items() if key in _FIELDS},
+        )
     except (ValueError, ArithmeticError, RuntimeError) as error:
-        return ProblemResult(problem.scene_name, problem.index, FAILED, str(error))
-
-
-def _result(problem: Problem, run: Trajectory, options: RunOptions) -> ProblemResult:
-    steps = run.scenario.arm.difference(run.q[:-1], run.q[1:])
-    reached = run.outcome == Outcome.REACHED
-    return ProblemResult(
-        scene=problem.scene_name,
-        index=problem.index,
-        detail=run.detail,
-        motion_s=motion_time(run) if reached else None,
-        optimal_s=time_optimal(run) if reached and options.time_optimal else None,
-        path_length_rad=float(np.linalg.norm(steps, axis=1).sum()),
-        **{key: value for key, value in run.summary().items() if key in _FIELDS},
-    )
+        return ProblemResult(scene, index, FAILED, str(error))
 
 
 def _run(problem: Problem, options: RunOptions) -> Trajectory:
