@@ -84,7 +84,7 @@ def simulate(
         if isinstance(plan, NoPath):
             return plan
         controller = make_controller(scenario, plan)
-        return Drive(controller, plan.guided.describe_stall, plan.reference)
+        return Drive(controller, plan.describe_stall, plan.reference)
 
     run = run_closed_loop(scenario, by_density, on_progress)
     return replace(run, plan_time=0.0) if chosen == GuideKind.DIRECT else run

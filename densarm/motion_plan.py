@@ -1,6 +1,7 @@
 """MotionPlan: from a guide's sub-goals to what a controller follows."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -33,16 +34,35 @@ _STOP_SHARE = 0.5
 """Share of the smooth path's room that brakes keep too; the rest is for tracking errors."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class MotionPlan:
     """What the controllers need to know of the way."""
 
-    guided: GuidedDensity
-    """The density along the sub-goals."""
+    scenario: Scenario
+    """What was planned for."""
+    path: GuidePath
+    """The guide's sub-goals."""
     bound: SweptBound
     """The swept bound under the scenario's margin."""
-    reference: Reference | None
+    reference: Reference | None = None
     """The timed trajectory of the planning system, to where it got, if it is to be tracked."""
+
+    @cached_property
+    def guided(self) -> GuidedDensity:
+        """The density along the sub-goals."""
+        scenario = self.scenario
+        return GuidedDensity(
+            self.bound.clearance,
+            SubGoalChain(self.bound, self.path, scenario.sensing),
+            scenario.control.margin,
+            scenario.density,
+            scenario.control.kappa,
+            _weights(scenario),
+        )
+
+    def describe_stall(self, q: Array) -> str:
+        """As `GuidedDensity.describe_stall`."""
+        return self.guided.describe_stall(q)
 
 
 def plan_motion(
@@ -70,21 +90,29 @@ def plan_motion(
             break
     if isinstance(path, NoPath):
         return path
-    chain = SubGoalChain(bound, path, scenario.sensing)
-    guided = GuidedDensity(
-        clearance, chain, control.margin, scenario.density, control.kappa, _weights(scenario)
-    )
+    plan = MotionPlan(scenario, path, bound)
     if control.form != ControlForm.TRACKING:
-        return MotionPlan(guided, bound, reference=None)
-    curve = PlanningSystem(guided, bound).integrate(depart)
-    guided.restart()
+        return plan
     kept = 0.5 * (path_bound.margin - control.margin) if path.is_clear else 0.0
     smooth_bound = bound.with_margin(control.margin + kept)
     stop_bound = bound.with_margin(control.margin + _STOP_SHARE * kept)
-    reference = _reference(scenario, smooth_bound, stop_bound, np.vstack([start, curve.q]))
+    curve = np.vstack([start, _curve(plan)])
+    reference = _reference(scenario, smooth_bound, stop_bound, curve)
     if reference is None:
         return NoPath("no smooth path near the planning system's curve is proved clear")
-    return MotionPlan(guided, bound, reference)
+    return replace(plan, reference=reference)
+
+
+def _curve(plan: MotionPlan) -> Array:
+    """Return points (N, nq) of the planning system's curve.
+
+    On a path that is proved clear nothing is sensed, the sensing distances being below the
+    path's own clearance: the density leads from each sub-goal straight to the next.
+    """
+    path = plan.path
+    if path.is_clear:
+        return path.waypoints
+    return PlanningSystem(plan.guided, plan.bound).integrate(path.waypoints[0]).q
 
 
 def _chosen(guide: Guide | GuideKind, scenario: Scenario, bound: SweptBound) -> Guide:

@@ -10,7 +10,7 @@ from densarm.proof.separating_planes import SeparatingPlanes
 from densarm.proof.straight_brake import StraightBrake
 from densarm.proof.swept_bound import SweptBound
 
-_LARGEST_GROUP = 64  # samples whose brakes are tried at once
+_LARGEST_GROUP = 256  # samples whose brakes are tried at once
 _ROUNDING = 1e-9  # [rad or m]
 
 
@@ -41,14 +41,10 @@ class StoppingResult:
 class StoppingCheck:
     r"""Proves the straight brakes from all samples of a motion clear, many at a time.
 
-    The brake from sample i moves the joints from q_i by w_i. Each point of the brakes of samples
-    a to b is within
-
-    .. math:: \delta_j = \max_{a \le i \le b} \max\{|q_i \ominus q_m|_j,
-        |q_i \oplus w_i \ominus q_m \oplus w_m|_j\}
-
-    of the brake of the middle one, m, so that a proof of that brake with bodies grown by
-    Σ_j r_kj δ_j proves all of them. Where there is none the samples are halved.
+    The brakes of neighbouring samples are segments of joint space that nearly lie on one line. A
+    tube, all points within δ_j per joint of a segment, is convex: it holds a brake if it holds
+    both ends of it. A proof of the segment with bodies grown by Σ_j r_kj δ_j proves all brakes
+    in its tube. Where there is none the samples are halved.
 
     Args:
         bound: the pairs, the bound r_kj on their motion, and the margin to be kept.
@@ -85,10 +81,24 @@ class StoppingCheck:
         waiting = [(a, min(a + _LARGEST_GROUP, n)) for a in range(0, n, _LARGEST_GROUP)]
         while waiting:
             a, b = waiting.pop()
-            m = (a + b) // 2
-            off = np.maximum(np.abs(angles[a:b] - angles[m]), np.abs(end[a:b] - end[m])).max(axis=0)
-            if self._planes.tube_is_clear(angles[m], travel[m], off):
+            if self._planes.tube_is_clear(*_tube(angles[a:b], end[a:b])):
                 clear[a:b] = True
             elif b - a > 1:
+                m = (a + b) // 2
                 waiting += [(a, m), (m, b)]
         return clear
+
+
+def _tube(first: Array, last: Array) -> tuple[Array, Array, Array]:
+    """Return one end of a segment, the step to the other, and the radius of a tube of points.
+
+    Args:
+        first: where brakes begin (N, nv) [rad or m].
+        last: where they end (N, nv) [rad or m].
+    """
+    points, begin, step = np.vstack([first, last]), first[0], last[-1] - first[0]
+    square = float(step @ step)
+    share = np.clip((points - begin) @ step / square, 0.0, 1.0) if square > 0.0 else 0.0
+    off = points - begin - np.multiply.outer(share, step)
+    low, high = off.min(axis=0), off.max(axis=0)
+    return begin + 0.5 * (low + high), step, 0.5 * (high - low)

@@ -113,7 +113,7 @@ def _by_density(
     plan = plan_motion(scenario, clearance, guide)
     if isinstance(plan, NoPath):
         return plan
-    return Drive(make_controller(scenario, plan), plan.guided.describe_stall, plan.reference)
+    return Drive(make_controller(scenario, plan), plan.describe_stall, plan.reference)
 
 
 def _shared(scenario: Scenario, clearance: Clearance) -> tuple[Barriers, GoalDistance, SpeedLaw]:
