@@ -33,7 +33,7 @@ LAYERS = (
     ("robot", "catalogue"),
     ("scene_files",),
     ("arm",),
-    ("holding_torque", "rigid_body"),
+    ("holding_torque", "joint_torques", "rigid_body"),
     ("distance_view", "clearance"),
     ("proof", "clear_configurations"),
     ("density",),

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from densarm.arrays import Array
+from densarm.proof.enclosing_tube import enclosing_tube
 from densarm.proof.separating_planes import SeparatingPlanes
 from densarm.proof.straight_brake import StraightBrake
 from densarm.proof.swept_bound import SweptBound
@@ -41,10 +42,9 @@ class StoppingResult:
 class StoppingCheck:
     r"""Proves the straight brakes from all samples of a motion clear, many at a time.
 
-    The brakes of neighbouring samples are segments of joint space that nearly lie on one line. A
-    tube, all points within δ_j per joint of a segment, is convex: it holds a brake if it holds
-    both ends of it. A proof of the segment with bodies grown by Σ_j r_kj δ_j proves all brakes
-    in its tube. Where there is none the samples are halved.
+    The brakes of neighbouring samples are segments of joint space that nearly lie on one line, in
+    one tube of radius δ_j. A proof of its middle with bodies grown by Σ_j r_kj δ_j proves all of
+    them. Where there is none the samples are halved.
 
     Args:
         bound: the pairs, the bound r_kj on their motion, and the margin to be kept.
@@ -81,24 +81,10 @@ class StoppingCheck:
         waiting = [(a, min(a + _LARGEST_GROUP, n)) for a in range(0, n, _LARGEST_GROUP)]
         while waiting:
             a, b = waiting.pop()
-            if self._planes.tube_is_clear(*_tube(angles[a:b], end[a:b])):
+            points = np.vstack([angles[a:b], end[a:b]])
+            if self._planes.tube_is_clear(*enclosing_tube(points, points[-1] - points[0])):
                 clear[a:b] = True
             elif b - a > 1:
                 m = (a + b) // 2
                 waiting += [(a, m), (m, b)]
         return clear
-
-
-def _tube(first: Array, last: Array) -> tuple[Array, Array, Array]:
-    """Return one end of a segment, the step to the other, and the radius of a tube of points.
-
-    Args:
-        first: where brakes begin (N, nv) [rad or m].
-        last: where they end (N, nv) [rad or m].
-    """
-    points, begin, step = np.vstack([first, last]), first[0], last[-1] - first[0]
-    square = float(step @ step)
-    share = np.clip((points - begin) @ step / square, 0.0, 1.0) if square > 0.0 else 0.0
-    off = points - begin - np.multiply.outer(share, step)
-    low, high = off.min(axis=0), off.max(axis=0)
-    return begin + 0.5 * (low + high), step, 0.5 * (high - low)

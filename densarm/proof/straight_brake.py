@@ -1,10 +1,10 @@
 """StraightBrake: the shortest brake along a straight line of joint space within the limits."""
 
 import numpy as np
-import pinocchio as pin
 
 from densarm.arm import Arm
 from densarm.arrays import Array
+from densarm.joint_torques import joint_torques
 
 HELD_SHARE = 0.95
 """Share of the acceleration limits that is asked for: a torque is held while the state changes."""
@@ -40,7 +40,6 @@ class StraightBrake:
         self._arm = arm
         self._acceleration = acceleration_share * arm.limits.acceleration
         self._effort = torque_share * arm.limits.effort * (1.0 + _ROUNDING)
-        self._pool = pin.ModelPool(arm.model, 1)
 
     def duration(self, q: Array, v: Array) -> float:
         """Return T [s] from one state, q (nq,) and v (nv,); as `durations`."""
@@ -72,12 +71,12 @@ class StraightBrake:
         q = self._arm.configurations(theta)
         speed = (1.0 - _SHARES)[:, np.newaxis] * v[:, np.newaxis]
         brake = -_BRAKES[:, np.newaxis] * (v / duration[:, np.newaxis])[:, np.newaxis]
-        torque = self._torque(q, speed, brake)
+        torque = joint_torques(self._arm, q, speed, brake)
         growth = np.ones(len(v))
         weak = ~(np.abs(torque) <= self._effort).all(axis=(1, 2))
         if not weak.any():
             return growth
-        held = self._torque(q[weak], speed[weak], np.zeros_like(speed[weak]))
+        held = joint_torques(self._arm, q[weak], speed[weak], np.zeros_like(speed[weak]))
         growth[weak] = self._needed(held, torque[weak] - held)
         return growth
 
@@ -95,9 +94,3 @@ class StraightBrake:
             needed = np.where(share > 0.0, 1.0 / share, _LARGEST_GROWTH)
         needed = np.nan_to_num(needed, nan=_LARGEST_GROWTH)
         return np.asarray(np.clip(needed, _GROWTH, _LARGEST_GROWTH))
-
-    def _torque(self, q: Array, v: Array, a: Array) -> Array:
-        """Return the torque (N, M, nv) of states and accelerations, each (N, M, ...)."""
-        columns = [np.asfortranarray(x.reshape(-1, x.shape[-1]).T) for x in (q, v, a)]
-        # Pinocchio drops the axis of a single joint.
-        return np.asarray(pin.rneaInParallel(1, self._pool, *columns)).T.reshape(v.shape)

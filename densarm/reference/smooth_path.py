@@ -5,7 +5,8 @@ from scipy.interpolate import BSpline
 
 from densarm.arrays import Array
 from densarm.proof.swept_bound import SweptBound
-from densarm.proof.swept_check import SweptCheck, SweptVerdict
+from densarm.proof.swept_check import SweptVerdict
+from densarm.proof.tube_check import TubeCheck
 
 _DEGREE = 3
 _WIDEST = 0.8  # [rad] between control points at first
@@ -37,7 +38,7 @@ def smooth_path(bound: SweptBound, curve: Array) -> SmoothPath | None:
 
     Control points of a clamped uniform cubic B-spline are taken from the polyline at equal
     distances. Each piece of the spline stays in the convex hull of four of them, so that it tends
-    to the polyline as they get denser: their distance is halved until the swept check proves the
+    to the polyline as they get denser: their distance is halved until a check proves the
     path clear.
 
     Args:
@@ -53,11 +54,11 @@ def smooth_path(bound: SweptBound, curve: Array) -> SmoothPath | None:
     steps = arm.difference(curve[:-1], curve[1:])
     corner = arm.angles(curve[0]) + np.vstack([np.zeros(arm.nv), np.cumsum(steps, axis=0)])
     length = np.append(0.0, np.cumsum(np.linalg.norm(steps, axis=1)))
-    check = SweptCheck(bound)
+    check = TubeCheck(bound)
     for halving in range(_HALVINGS):
         count = max(_DEGREE + 1, 1 + int(np.ceil(length[-1] * 2.0**halving / _WIDEST)))
         path = _spline(length, corner, count)
-        if _is_clear(check, bound, path, corner[0], curve[0], length[-1]):
+        if _is_clear(check, path, length[-1]):
             return path
     return None
 
@@ -70,29 +71,23 @@ def _spline(length: Array, corner: Array, count: int) -> SmoothPath:
     return SmoothPath(BSpline(knots, control, _DEGREE))
 
 
-def _is_clear(
-    check: SweptCheck, bound: SweptBound, path: SmoothPath, origin: Array, q0: Array, length: float
-) -> bool:
+def _is_clear(check: TubeCheck, path: SmoothPath, length: float) -> bool:
     """Return whether the path is proved clear, sampled ever finer until that is decided."""
     pieces = len(np.unique(path.knots)) - 1
     parts = max(_PARTS, int(np.ceil(length / pieces / _SAMPLE)))
     for doubling in range(_DOUBLINGS):
-        verdict = _verdict(check, bound, path, origin, q0, parts * 2**doubling)
+        verdict = _verdict(check, path, parts * 2**doubling)
         if verdict != SweptVerdict.UNDECIDED:
             break
     return verdict == SweptVerdict.CLEAR
 
 
-def _verdict(
-    check: SweptCheck, bound: SweptBound, path: SmoothPath, origin: Array, q0: Array, parts: int
-) -> SweptVerdict:
-    """Return what the swept check says of the path, each polynomial piece sampled in parts."""
+def _verdict(check: TubeCheck, path: SmoothPath, parts: int) -> SweptVerdict:
+    """Return what is proved of the path, each polynomial piece sampled in parts."""
     pieces = np.unique(path.knots)
     at = np.arange(parts * (len(pieces) - 1) + 1) / parts
     s = np.interp(at, np.arange(len(pieces)), pieces)
-    q = bound.arm.integrate(q0, path(s) - origin)
     # The second derivative is linear between samples, so that it is largest at one of them.
     curvature = np.abs(path(s, 2))
     largest = np.maximum(curvature[:-1], curvature[1:])
-    departure = largest / 8.0 * np.diff(s)[:, np.newaxis] ** 2
-    return check.check(q, departure).verdict
+    return check.check(path(s), largest / 8.0 * np.diff(s)[:, np.newaxis] ** 2)

@@ -1,17 +1,19 @@
 """Time-optimal timing of a path under velocity, acceleration and torque limits, by TOPP-RA."""
 
+import math
 from typing import Any, NamedTuple
 
 import numpy as np
-import pinocchio as pin
 import toppra
 import toppra.algorithm
 import toppra.constraint
 from numpy.typing import NDArray
+from toppra.constraint import canlinear_colloc_to_interpolate
 
 from densarm.arm import Arm
 from densarm.arrays import Array
 from densarm.holding_torque import holding_ratios, holding_torque
+from densarm.joint_torques import joint_torques
 from densarm.proof.stopping_check import StoppingCheck
 from densarm.reference.infeasible_timing import InfeasibleTimingError
 from densarm.reference.reference import Reference
@@ -19,10 +21,11 @@ from densarm.reference.smooth_path import SmoothPath
 from densarm.reference.timing_parameters import TimingParameters
 
 _UNLIMITED = 1e4  # stands for an infinite limit, which TOPP-RA's solver does not take
-_GRID_STEP = 0.01  # [rad] between grid points
+_GRID_STEP = 0.02  # [rad] between grid points at most
 _GRID = (100, 1000)
 _GRID_SHARE = 0.98  # of the limits at grid points; the rest is for what lies between them
 _SLOWDOWNS = 1.02 ** np.arange(50)  # tried in turn until the limits hold at every sample
+_CHECKED = 4  # samples from one brake that is checked to the next
 _ROUNDS = 12  # of slowing down where stopping is not proved
 _HALVINGS = 7  # of the range that the largest speed to stop from is in
 _CAP_SHARE = 0.98  # of that speed; the rest is for what lies between grid points
@@ -48,7 +51,7 @@ def time_path(
         length: of the path [rad], which sets the grid.
         period: time between the reference's samples [s].
         parameters: shares of the limits.
-        stopping: proves the brakes from all samples; None to do without.
+        stopping: proves the brakes from every fourth sample; None to do without.
 
     Raises:
         InfeasibleTimingError: no speed meets the limits somewhere on the path, or none was found
@@ -57,12 +60,13 @@ def time_path(
     Source: Pham and Pham, A New Approach to Time-Optimal Path Parameterization Based on
         Reachability Analysis, IEEE T-RO 2018.
     """
-    grid = np.linspace(0.0, 1.0, int(np.clip(length / _GRID_STEP, *_GRID)) + 1)
-    toppra_path = _ToppraPath(path, arm.nv)
-    limits = [_Computed(limit, toppra_path, grid) for limit in _constraints(arm, parameters)]
-    cap, where = np.full(len(grid), _UNLIMITED), path(0.0)
+    pieces = len(np.unique(path.knots)) - 1
+    parts = math.ceil(np.clip(length / _GRID_STEP, *_GRID) / pieces)
+    grid = np.linspace(0.0, 1.0, parts * pieces + 1)
+    limits, cap = _Limits(arm, path, grid, parameters), _velocity_cap(arm, path, grid, parameters)
+    toppra_path, where = _ToppraPath(path, arm.nv), path(0.0)
     for _ in range(_ROUNDS):
-        fastest = toppra.algorithm.TOPPRA([*limits, _SpeedCap(arm.nv, cap)], toppra_path, grid)
+        fastest = toppra.algorithm.TOPPRA([limits, _SpeedCap(arm.nv, cap)], toppra_path, grid)
         _, speed, _ = fastest.compute_parameterization(0.0, 0.0)
         timing = _timing_within_limits(arm, path, grid, speed, period, parameters)
         if timing is None:
@@ -122,8 +126,8 @@ def _failing(stopping: StoppingCheck | None, arm: Arm, timing: _Timing) -> NDArr
     """Return the samples from which stopping is not proved."""
     if stopping is None:
         return np.zeros(0, dtype=np.int64)
-    reference = timing.reference
-    return stopping.check(arm.configurations(reference.position), reference.velocity).failing
+    q = arm.configurations(timing.reference.position[::_CHECKED])
+    return _CHECKED * stopping.check(q, timing.reference.velocity[::_CHECKED]).failing
 
 
 def _lower(
@@ -154,39 +158,27 @@ def _lower(
 
 def _is_within_limits(arm: Arm, reference: Reference, parameters: TimingParameters) -> bool:
     """Check all samples: TOPP-RA holds the limits at its grid points only."""
-    limits, data = arm.limits, arm.model.createData()
+    limits = arm.limits
     if (np.abs(reference.velocity) > parameters.velocity_share * limits.velocity).any():
         return False
     acceleration = np.diff(reference.velocity, axis=0) / reference.period
     if (np.abs(acceleration) > parameters.acceleration_share * limits.acceleration).any():
         return False
-    states = zip(
+    torque = joint_torques(
+        arm,
         arm.configurations(reference.position[:-1]),
         reference.velocity[:-1],
         acceleration,
-        strict=True,
     )
-    torque = np.array([pin.rnea(arm.model, data, *state) for state in states])
     return bool((np.abs(torque) <= parameters.torque_share * limits.effort).all())
 
 
-def _constraints(arm: Arm, parameters: TimingParameters) -> list[toppra.constraint.Constraint]:
-    limits, data = arm.limits, arm.model.createData()
-
-    def torque(theta: Array, v: Array, a: Array) -> Array:
-        return np.array(pin.rnea(arm.model, data, arm.configuration(theta), v, a))
-
-    return [
-        toppra.constraint.JointVelocityConstraint(
-            _both_sides(limits.velocity * parameters.velocity_share)
-        ),
-        toppra.constraint.JointAccelerationConstraint(
-            _both_sides(limits.acceleration * parameters.acceleration_share)
-        ),
-        toppra.constraint.JointTorqueConstraint(
-            torque, _both_sides(limits.effort * parameters.torque_share), np.zeros(arm.nv)
-        ),
-    ]
+def _velocity_cap(arm: Arm, path: SmoothPath, grid: Array, parameters: TimingParameters) -> Array:
+    """Return path speeds at grid points (N,) [1/s] within the velocity limits."""
+    limit = _bounded(parameters.velocity_share * arm.limits.velocity)
+    with np.errstate(divide="ignore"):
+        cap = (limit / np.abs(path(grid, 1))).min(axis=1)
+    return np.asarray(np.minimum(cap, _UNLIMITED))
 
 
 def _unstoppable(arm: Arm, angles: Array) -> InfeasibleTimingError:
@@ -206,9 +198,8 @@ def _too_weak(arm: Arm, q: Array, torque_share: float) -> InfeasibleTimingError:
     )
 
 
-def _both_sides(limit: Array) -> Array:
-    bounded = np.minimum(_GRID_SHARE * limit, _UNLIMITED)
-    return np.column_stack([-bounded, bounded])
+def _bounded(limit: Array) -> Array:
+    return np.minimum(_GRID_SHARE * limit, _UNLIMITED)
 
 
 class _ToppraPath(toppra.interpolator.AbstractGeometricPath):
@@ -230,16 +221,35 @@ class _ToppraPath(toppra.interpolator.AbstractGeometricPath):
         return np.array([0.0, 1.0])
 
 
-class _Computed(toppra.constraint.LinearConstraint):
-    """A constraint whose coefficients are computed once for several timings."""
+class _Limits(toppra.constraint.LinearConstraint):
+    """Limits of acceleration and torque, a s̈ + b ṡ² + c, at both ends of every grid interval."""
 
     def __init__(
-        self, inner: toppra.constraint.LinearConstraint, path: _ToppraPath, grid: Array
+        self, arm: Arm, path: SmoothPath, grid: Array, parameters: TimingParameters
     ) -> None:
         super().__init__()
-        self.dof = inner.dof
-        self.identical = inner.identical
-        self._found = inner.compute_constraint_params(path, grid)
+        self.dof, self.identical = arm.nv, True
+        theta, slope, bend = (path(grid, order) for order in range(3))
+        q, zero = arm.configurations(theta), np.zeros_like(slope)
+        held, driven, swung = (
+            joint_torques(arm, q, v, a) for v, a in ((zero, zero), (zero, slope), (slope, bend))
+        )
+        shares, limits = parameters, arm.limits
+        limit = np.append(
+            _bounded(shares.acceleration_share * limits.acceleration),
+            _bounded(shares.torque_share * limits.effort),
+        )
+        self._found = canlinear_colloc_to_interpolate(
+            np.hstack([slope, driven - held]),
+            np.hstack([bend, swung - held]),
+            np.hstack([zero, held]),
+            np.vstack([np.eye(len(limit)), -np.eye(len(limit))]),
+            np.append(limit, limit),
+            None,
+            None,
+            grid,
+            identical=True,
+        )
 
     def compute_constraint_params(self, *_: object) -> Any:
         return self._found
