@@ -71,7 +71,8 @@ class Clearance:
         names = [item.name for item in self.geometry_model.geometryObjects]
         self.pairs = tuple((names[i], names[j]) for i, j in self.pair_shapes)
         self.n_pairs = len(self.pairs)
-        self._sign = self._joint_signs()
+        self.sign = self._joint_signs()
+        """S_2 - S_1 (K, nv): how each joint moves body 2 of a pair against body 1."""
         self.distance: Array = np.zeros(self.n_pairs)
         """Distances that the last `update` found (K,) [m]; overwritten by the next."""
         self.gradient: Array = np.zeros((self.n_pairs, arm.nv))
@@ -100,7 +101,7 @@ class Clearance:
         if self.n_pairs:
             pin.computeDistances(self.geometry_model, self.geometry_data)
             _pair_gradients(
-                self._view.read(), self._jacobian, self._sign, self.distance, self.gradient
+                self._view.read(), self._jacobian, self.sign, self.distance, self.gradient
             )
 
     def distances(self, q: Array, pairs: NDArray[np.int64] | None = None) -> Array:
@@ -165,13 +166,30 @@ def _pair_gradients(
 ) -> None:
     for k in range(rows.shape[0]):
         distance[k] = rows[k, 0]
-        nx, ny, nz = rows[k, 1], rows[k, 2], rows[k, 3]
-        px, py, pz = rows[k, 4], rows[k, 5], rows[k, 6]
-        mx, my, mz = py * nz - pz * ny, pz * nx - px * nz, px * ny - py * nx
         for j in range(sign.shape[1]):
             gradient[k, j] = 0.0
-            if sign[k, j] != 0.0:
-                gradient[k, j] = sign[k, j] * (
+        add_pair_gradient(rows[k], jacobian, sign[k], 1.0, gradient[k])
+
+
+@compiled
+def add_pair_gradient(row: Array, jacobian: Array, sign: Array, factor: float, out: Array) -> None:
+    """Add a multiple of the gradient of one distance in place.
+
+    Args:
+        row: [distance, normal, point 1, point 2], as `DistanceView` has it (10,).
+        jacobian: world-frame joint Jacobian (6, nv).
+        sign: S_2 - S_1 (nv,).
+        factor: of the gradient.
+        out: added to (nv,).
+    """
+    nx, ny, nz = row[1], row[2], row[3]
+    px, py, pz = row[4], row[5], row[6]
+    mx, my, mz = py * nz - pz * ny, pz * nx - px * nz, px * ny - py * nx
+    for j in range(sign.shape[0]):
+        if sign[j] != 0.0:
+            out[j] += factor * (
+                sign[j]
+                * (
                     nx * jacobian[0, j]
                     + ny * jacobian[1, j]
                     + nz * jacobian[2, j]
@@ -179,3 +197,4 @@ def _pair_gradients(
                     + my * jacobian[4, j]
                     + mz * jacobian[5, j]
                 )
+            )

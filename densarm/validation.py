@@ -34,6 +34,20 @@ def finite_vector(name: str, value: ArrayLike, length: int, hint: str = "") -> A
     return vector
 
 
+def positive_array(name: str, value: ArrayLike, length: int) -> Array:
+    """Return one positive number, or `length` of them, as a new float array (length,).
+
+    Raises:
+        InvalidValueError: a wrong shape, or an entry that is not finite and positive.
+    """
+    array = np.array(value, dtype=np.float64)
+    for entry in array.flat:
+        positive(name, entry)
+    if array.shape not in [(), (length,)]:
+        raise InvalidValueError(name, value, f"a number or of shape ({length},)")
+    return np.broadcast_to(array, (length,)).copy()
+
+
 def finite_tuple(name: str, value: ArrayLike, length: int) -> tuple[float, ...]:
     """Return `value` as a tuple of `length` finite floats; errors as `finite_vector`."""
     return tuple(finite_vector(name, value, length).tolist())

@@ -15,14 +15,16 @@ from densarm.clearance import COAL_TOLERANCE, Clearance
 from densarm.control.density_tracking import DensityTracking
 from densarm.control.gains import Gains
 from densarm.density import (
-    ClearanceSet,
     DensityParameters,
     JointLimitSet,
     NavigationDensity,
+    NearClearanceSet,
+    NearPairs,
     TorusDistance,
     UnsafeSet,
 )
 from densarm.fields.sub_goal_chain import SensingParameters
+from densarm.proof.swept_bound import SweptBound
 from densarm.reference.reference import Reference
 
 _OFF_REFERENCE = 1e-3  # of the states in every joint [rad or m]
@@ -90,7 +92,7 @@ def _controller(clearance: Clearance, reference: Reference) -> DensityTracking:
     arm, sensing = clearance.arm, SensingParameters()
     goal_distance = TorusDistance(arm, arm.configuration(reference.position[-1]))
     unsafe: list[UnsafeSet] = [
-        ClearanceSet(clearance, 0.0, sensing.distance),
+        NearClearanceSet(NearPairs(SweptBound(clearance)), 0.0, sensing.distance),
         JointLimitSet(arm, sensing.joint),
     ]
     density = NavigationDensity(unsafe, goal_distance, DensityParameters())

@@ -11,6 +11,7 @@ from densarm.arrays import Array
 from densarm.compiled import compiled
 from densarm.validation import finite_vector
 
+_FLOAT = np.dtype(np.float64)
 _UNIT_TOLERANCE = 1e-6  # of cos² + sin² of a continuous joint
 
 
@@ -36,8 +37,7 @@ class Controller(Protocol):
 
 def checked_state(arm: Arm, q: ArrayLike, v: ArrayLike) -> tuple[Array, Array]:
     """Return q (nq,) and v (nv,) as float arrays; errors as `Controller.torque`."""
-    q = np.ascontiguousarray(q, dtype=np.float64)
-    v = np.ascontiguousarray(v, dtype=np.float64)
+    q, v = np.ascontiguousarray(q, _FLOAT), np.ascontiguousarray(v, _FLOAT)
     if _is_state(q, v, arm.nq, arm.idx_q, arm.is_circle):
         return q, v
     return arm.check_configuration("configuration", q), finite_vector("velocity", v, arm.nv)

@@ -1,17 +1,22 @@
 """DensityTracking: the density inverse-dynamics controller along a reference."""
 
+from typing import Any
+
 import numpy as np
-from numpy.typing import ArrayLike
+import pinocchio as pin
+from numpy.typing import ArrayLike, NDArray
 
 from densarm.arm import Arm
 from densarm.arrays import Array
 from densarm.compiled import compiled
 from densarm.control.controller import checked_state
 from densarm.control.gains import Gains
-from densarm.control.inverse_dynamics import InverseDynamics
-from densarm.density import NavigationDensity, TorusDistance
+from densarm.control.inverse_dynamics import InverseDynamics, limited_torque
+from densarm.density import NavigationDensity, NearClearanceSet, TorusDistance
+from densarm.density.gauge_gradient import gauge_exponents, write_gauge_gradient
+from densarm.density.goal_distance import torus_distance, write_configuration
 from densarm.proof.straight_brake import HELD_SHARE
-from densarm.reference.reference import Reference
+from densarm.reference.reference import Reference, hermite
 
 
 class DensityTracking:
@@ -43,28 +48,88 @@ class DensityTracking:
     ) -> None:
         self._arm = arm
         self._density = density
-        self._reference = reference
-        self._gains = gains
-        self._dynamics = InverseDynamics(arm, HELD_SHARE * arm.limits.acceleration)
-        self._gauge = density.parameters.gauge
-        self._brake, self._attract = np.zeros(arm.nv), np.zeros(arm.nv)
+        self._dynamics = InverseDynamics(
+            arm, HELD_SHARE * arm.limits.acceleration, _mass_data(density)
+        )
+        parameters, goal_distance = density.parameters, density.goal_distance
+        self._fixed: tuple[Any, ...] = (
+            reference.period,
+            goal_distance.kappa,
+            parameters.alpha,
+            *gauge_exponents(parameters.gauge, parameters.alpha),
+            gains.position,
+            gains.velocity,
+            reference.position,
+            reference.velocity,
+            arm.idx_q,
+            arm.is_circle,
+            goal_distance.goal,
+            goal_distance.weights,
+            density.log_psi_gradient,
+            *self._dynamics.terms,
+            np.zeros((9, arm.nv)),
+        )
 
     def torque(self, t: float, q: ArrayLike, v: ArrayLike) -> Array:
         """Act as `Controller.torque`."""
         q, v = checked_state(self._arm, q, v)
-        point = self._reference.update(t, lead=0.5 * self._reference.period)
-        self._density.goal_distance.set_goal_angles(point[0])
-        self._density.update(q)
-        self._density.write_gradient(self._gauge, self._attract)
+        density = self._density
+        density.update_psi(q)
         self._dynamics.update(q, v)
-        _feedback(point, v, self._gains.position, self._gains.velocity, self._brake, self._attract)
-        return self._dynamics.torque(self._brake, self._attract)
+        tau = np.empty(len(v))
+        _write_torque(t, q, v, density.log_psi, tau, *self._fixed)
+        return tau
+
+
+def _mass_data(density: NavigationDensity[TorusDistance]) -> pin.Data | None:
+    """Return the data in which a density computes M at its configuration, if it does."""
+    near = [item.pairs.data for item in density.unsafe_sets if isinstance(item, NearClearanceSet)]
+    return near[0] if near else None
 
 
 @compiled
-def _feedback(
-    point: Array, v: Array, position_gain: float, velocity_gain: float, brake: Array, attract: Array
+def _write_torque(
+    t: float,
+    q: Array,
+    v: Array,
+    log_psi: float,
+    tau: Array,
+    period: float,
+    kappa: float,
+    alpha: float,
+    distance_exponent: float,
+    psi_exponent: float,
+    position_gain: float,
+    velocity_gain: float,
+    position: Array,
+    velocity: Array,
+    idx_q: NDArray[np.int64],
+    is_circle: NDArray[np.bool_],
+    goal: Array,
+    weights: Array,
+    log_psi_gradient: Array,
+    mass: Array,
+    nonlinear: Array,
+    limits: Array,
+    workspace: Array,
 ) -> None:
+    """Write the torque of `DensityTracking`, in one kernel since every call has its cost."""
+    parts, point, brake, attract = workspace[:3], workspace[3:6], workspace[6], workspace[7]
+    distance_gradient = workspace[8]
+    hermite(t / period, t / period + 0.5, period, position, velocity, point)
+    write_configuration(point[0], idx_q, is_circle, goal)
+    distance = torus_distance(goal, q, idx_q, is_circle, weights, kappa, distance_gradient)
+    write_gauge_gradient(
+        log_psi_gradient,
+        distance,
+        distance_gradient,
+        alpha,
+        log_psi,
+        distance_exponent,
+        psi_exponent,
+        attract,
+    )
     for i in range(v.shape[0]):
         brake[i] = point[2, i] - velocity_gain * (v[i] - point[1, i])
         attract[i] *= position_gain
+    limited_torque(mass, nonlinear, limits, brake, attract, parts, tau)

@@ -19,22 +19,27 @@ class InverseDynamics:
     Args:
         arm: its dynamics and torque limits.
         acceleration_limit: on the sum of both parts (nv,) [rad/s² or m/s²]; may be infinite.
+        mass_data: data in which M is computed at q before every update; None to compute it.
 
     Source: [ZNV] eq. 16-17; saturation [ZNV] eq. 13-14, applied to the attraction alone.
     """
 
-    def __init__(self, arm: Arm, acceleration_limit: Array) -> None:
+    def __init__(
+        self, arm: Arm, acceleration_limit: Array, mass_data: pin.Data | None = None
+    ) -> None:
         self._model = arm.model
-        self._data = arm.model.createData()
+        self._computes_mass = mass_data is None
+        self._data = arm.model.createData() if mass_data is None else mass_data
         self._mass = self._data.M
-        self._nonlinear = self._data.nle
-        self._acceleration_limit = acceleration_limit
-        self._effort_limit = arm.limits.effort
         self._workspace = np.zeros((3, arm.nv))
+        limits = np.array([acceleration_limit, arm.limits.effort])
+        self.terms: tuple[Array, Array, Array] = (self._mass, self._data.nle, limits)
+        """M and H of the last update, and the limits, as `limited_torque` takes them."""
 
     def update(self, q: Array, v: Array) -> None:
         """Compute M and H at the state, q (nq,) and v (nv,)."""
-        pin.crba(self._model, self._data, q)
+        if self._computes_mass:
+            pin.crba(self._model, self._data, q)
         pin.nonLinearEffects(self._model, self._data, q, v)
 
     def mass_matrix(self) -> Array:
@@ -44,17 +49,8 @@ class InverseDynamics:
 
     def torque(self, brake: Array, attract: Array) -> Array:
         """Return torque (nv,) for accelerations (nv,) [rad/s²] at the updated state."""
-        tau = np.empty_like(self._effort_limit)
-        _limited_torque(
-            self._mass,
-            self._nonlinear,
-            brake,
-            attract,
-            self._acceleration_limit,
-            self._effort_limit,
-            self._workspace,
-            tau,
-        )
+        tau = np.empty(len(brake))
+        limited_torque(*self.terms, brake, attract, self._workspace, tau)
         return tau
 
 
@@ -81,17 +77,28 @@ def _shares(offset: Array, brake: Array, attract: Array, limit: Array) -> tuple[
 
 
 @compiled
-def _limited_torque(
+def limited_torque(
     mass: Array,
     nonlinear: Array,
+    limits: Array,
     brake: Array,
     attract: Array,
-    acceleration_limit: Array,
-    effort_limit: Array,
     workspace: Array,
     out: Array,
 ) -> None:
+    """Write the torque of `InverseDynamics`.
+
+    Args:
+        mass: M, of which the upper triangle is read (nv, nv).
+        nonlinear: H (nv,) [N·m or N].
+        limits: of acceleration [rad/s² or m/s²] and torque [N·m or N] (2, nv).
+        brake: its acceleration (nv,) [rad/s² or m/s²].
+        attract: its acceleration (nv,) [rad/s² or m/s²].
+        workspace: its first row is zero, the others are overwritten (3, nv).
+        out: overwritten (nv,).
+    """
     nv = nonlinear.shape[0]
+    acceleration_limit, effort_limit = limits[0], limits[1]
     zero, brake_torque, attract_torque = workspace[0], workspace[1], workspace[2]
     gamma, beta = _shares(zero, brake, attract, acceleration_limit)
     for i in range(nv):

@@ -15,6 +15,8 @@ from densarm.density.navigation_density import (
     DensitySample,
     NavigationDensity,
 )
+from densarm.density.near_clearance_set import NearClearanceSet
+from densarm.density.near_pairs import NearPairs
 from densarm.density.smooth_step import smooth_step
 from densarm.density.unsafe_set import ClearanceSet, ImplicitSet, JointLimitSet, UnsafeSet
 
@@ -28,6 +30,8 @@ __all__ = [
     "ImplicitSet",
     "JointLimitSet",
     "NavigationDensity",
+    "NearClearanceSet",
+    "NearPairs",
     "ProductDistance",
     "RantzerCondition",
     "TorusDistance",

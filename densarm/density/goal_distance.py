@@ -125,7 +125,7 @@ class TorusDistance:
 
     def set_goal_angles(self, angles: Array) -> None:
         """Move the goal to joint positions (nv,) [rad or m], in place and without checks."""
-        _write_configuration(angles, self._idx_q, self._is_circle, self.goal)
+        write_configuration(angles, self._idx_q, self._is_circle, self.goal)
 
     def evaluate(self, q: Array, out_gradient: Array) -> float:
         """Act as `GoalDistance.evaluate`."""
@@ -183,9 +183,10 @@ class ProductDistance:
 
 
 @compiled
-def _write_configuration(
+def write_configuration(
     angles: Array, idx_q: NDArray[np.int64], is_circle: NDArray[np.bool_], out: Array
 ) -> None:
+    """Write the configuration (nq,) of joint positions (nv,) [rad or m] into `out`."""
     for i in range(angles.shape[0]):
         if is_circle[i]:
             out[idx_q[i]] = math.cos(angles[i])

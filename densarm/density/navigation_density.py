@@ -180,12 +180,16 @@ class NavigationDensity(Generic[V]):
 
     def update(self, q: Array) -> None:
         """Evaluate the parts of ρ at `q`, shape (nq,), into the attributes, in place."""
+        self.update_psi(q)
+        self.goal_distance_value = self.goal_distance.evaluate(q, self.goal_distance_gradient)
+
+    def update_psi(self, q: Array) -> None:
+        """As `update`, but leave V and its gradient as they are."""
         gradient, theta, log_psi = self.log_psi_gradient, self.parameters.theta, 0.0
         gradient.fill(0.0)
         for unsafe_set in self.unsafe_sets:
             log_psi += unsafe_set.add_log_bump(q, theta, gradient)
         self.log_psi = log_psi
-        self.goal_distance_value = self.goal_distance.evaluate(q, self.goal_distance_gradient)
 
     def write_gradient(self, gauge: Gauge, out: Array) -> None:
         """Write `DensitySample.gradient` at the last `update` into `out`, shape (nv,)."""

@@ -12,7 +12,7 @@ from densarm.arrays import Array
 from densarm.compiled import compiled
 from densarm.density.inverse_bump import accumulate_log_bumps, log_inverse_bump
 from densarm.errors import InvalidValueError
-from densarm.validation import non_negative, positive
+from densarm.validation import non_negative, positive_array
 
 if TYPE_CHECKING:
     from densarm.arm import Arm
@@ -61,7 +61,7 @@ class ClearanceSet:
     def __init__(self, clearance: Clearance, margin: float, sensing_distance: ArrayLike) -> None:
         self.clearance = clearance
         self.margin = non_negative("margin", margin)
-        self.sensing_distance = _positive_array(
+        self.sensing_distance = positive_array(
             "sensing_distance", sensing_distance, clearance.distance.shape[0]
         )
 
@@ -94,29 +94,17 @@ class JointLimitSet:
 
     def __init__(self, arm: Arm, sensing_distance: ArrayLike) -> None:
         limits = arm.limits
-        width = _positive_array("sensing_distance", sensing_distance, len(arm.idx_q))
+        width = positive_array("sensing_distance", sensing_distance, len(arm.idx_q))
         bounds = np.concatenate([limits.lower, limits.upper])
         members = np.flatnonzero(np.isfinite(bounds) & ~np.tile(arm.is_circle, 2))
-        self._joint = members % len(arm.idx_q)
-        self._index_q = np.asarray(arm.idx_q, dtype=np.int64)[self._joint]
-        self._bound = bounds[members]
-        self._side = np.where(members < len(arm.idx_q), 1.0, -1.0)
-        self._width = width[self._joint]
+        joint = members % len(arm.idx_q)
+        self._index = np.array([joint, arm.idx_q[joint]], dtype=np.int64)
+        side = np.where(members < len(arm.idx_q), 1.0, -1.0)
+        self._member = np.array([bounds[members], side, width[joint]])
 
     def add_log_bump(self, q: Array, theta: float, out_gradient: Array) -> float:
         """Act as `UnsafeSet.add_log_bump`."""
-        if not self._bound.size:
-            return 0.0
-        return accumulate_limit_log_bumps(
-            q,
-            self._index_q,
-            self._joint,
-            self._bound,
-            self._side,
-            self._width,
-            theta,
-            out_gradient,
-        )
+        return accumulate_limit_log_bumps(q, self._index, self._member, theta, out_gradient)
 
 
 class ImplicitSet:
@@ -159,14 +147,7 @@ class ImplicitSet:
 
 @compiled
 def accumulate_limit_log_bumps(
-    q: Array,
-    index_q: NDArray[np.int64],
-    joint: NDArray[np.int64],
-    bound: Array,
-    side: Array,
-    width: Array,
-    theta: float,
-    out_gradient: Array,
+    q: Array, index: NDArray[np.int64], member: Array, theta: float, out_gradient: Array
 ) -> float:
     r"""Sum ln Ψ over position limits and add the gradient of the sum in place.
 
@@ -174,11 +155,9 @@ def accumulate_limit_log_bumps(
 
     Args:
         q: configuration, shape (nq,).
-        index_q: where in `q` each limited joint is, shape (M,).
-        joint: where in the tangent space it is, shape (M,).
-        bound: limits [rad or m], shape (M,).
-        side: 1 for a lower limit, −1 for an upper one, shape (M,).
-        width: sensing distances σ_m > 0 [rad or m], shape (M,).
+        index: where in the tangent space and in `q` each limited joint is, shape (2, M).
+        member: limits [rad or m], sides (1 for a lower limit, −1 for an upper one) and sensing
+            distances σ_m > 0 [rad or m], shape (3, M).
         theta: shift θ ≥ 0, dimensionless.
         out_gradient: shape (nv,), added to.
 
@@ -188,17 +167,9 @@ def accumulate_limit_log_bumps(
     Source: [ZNV] eq. 7-8.
     """
     total = 0.0
-    for m in range(bound.shape[0]):
-        value, slope = log_inverse_bump(side[m] * (q[index_q[m]] - bound[m]), width[m], theta)
+    for m in range(member.shape[1]):
+        bound, side, width = member[0, m], member[1, m], member[2, m]
+        value, slope = log_inverse_bump(side * (q[index[1, m]] - bound), width, theta)
         total += value
-        out_gradient[joint[m]] += slope * side[m]
+        out_gradient[index[0, m]] += slope * side
     return total
-
-
-def _positive_array(name: str, value: ArrayLike, length: int) -> Array:
-    array = np.array(value, dtype=np.float64)
-    for entry in array.flat:
-        positive(name, entry)
-    if array.shape not in [(), (length,)]:
-        raise InvalidValueError(name, value, f"a number or of shape ({length},)")
-    return np.broadcast_to(array, (length,)).copy()

@@ -4,6 +4,7 @@ from copy import copy
 
 import numpy as np
 import pinocchio as pin
+from numpy.typing import NDArray
 
 from densarm.arrays import Array
 from densarm.clearance import DISTANCE_TOLERANCE, Clearance, joint_support
@@ -43,6 +44,8 @@ class SweptBound:
         """For each shape the bounds r_j of the joints that move it (S, nv), else 0 [m/rad or 1]."""
         self.lever = self._pair_levers()
         """The bounds r_kj (K, nv) [m/rad, 1 for prismatic joints]."""
+        self.slides = _slides(self.arm.model)
+        """Which joints are prismatic (nv,); beyond their limits the bounds do not hold."""
 
     def with_margin(self, margin: float) -> "SweptBound":
         """Return the same bound under another margin [m]."""
@@ -145,6 +148,13 @@ def _axis_and_slide(model: pin.Model, joint: int) -> tuple[Array, bool]:
     subspace = model.joints[joint].createData().S.reshape(6)
     slide = bool(np.abs(subspace[3:]).max() == 0.0)
     return (subspace[:3] if slide else subspace[3:]), slide
+
+
+def _slides(model: pin.Model) -> NDArray[np.bool_]:
+    slides = np.zeros(model.nv, bool)
+    for joint in range(1, model.njoints):
+        slides[model.joints[joint].idx_v] = _axis_and_slide(model, joint)[1]
+    return slides
 
 
 def _extension(model: pin.Model, joint: int) -> float:

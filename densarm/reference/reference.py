@@ -55,14 +55,24 @@ class Reference:
             Rows position, velocity, acceleration (3, nv), as in `ReferencePoint`.
         """
         u = t / self.period
-        _hermite(u, u + lead / self.period, self.period, self.position, self.velocity, self._point)
+        hermite(u, u + lead / self.period, self.period, self.position, self.velocity, self._point)
         return self._point
 
 
 @compiled
-def _hermite(
+def hermite(
     u: float, u_acceleration: float, period: float, position: Array, velocity: Array, out: Array
 ) -> None:
+    """Interpolate a sampled trajectory.
+
+    Args:
+        u: time of position and velocity, in periods.
+        u_acceleration: time of the acceleration, in periods.
+        period: time between samples [s].
+        position: joint positions (N, nv) [rad or m].
+        velocity: joint velocities (N, nv) [rad/s or m/s].
+        out: rows position, velocity, acceleration (3, nv), overwritten.
+    """
     last = position.shape[0] - 1
     u = min(max(u, 0.0), float(last))
     k = min(int(u), last - 1)

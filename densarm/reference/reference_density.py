@@ -3,10 +3,11 @@
 import numpy as np
 
 from densarm.density import (
-    ClearanceSet,
     DensityParameters,
     JointLimitSet,
     NavigationDensity,
+    NearClearanceSet,
+    NearPairs,
     TorusDistance,
 )
 from densarm.fields.sub_goal_chain import SensingParameters
@@ -47,7 +48,7 @@ def reference_density(
     joint_sensing = np.clip(sensing.path_share * room, _SMALLEST, sensing.joint)
     return NavigationDensity(
         [
-            ClearanceSet(bound.clearance, bound.margin, pair_sensing),
+            NearClearanceSet(NearPairs(bound), bound.margin, pair_sensing),
             JointLimitSet(arm, joint_sensing),
         ],
         TorusDistance(arm, configurations[0], kappa=kappa),

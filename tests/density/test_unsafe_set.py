@@ -84,11 +84,8 @@ def test_joint_limits_act_on_bounded_joints_alone(joint_space, a, b, c):
 def test_joint_limit_kernel_equals_its_python_form(x, theta):
     arguments = (
         np.array([x]),
-        np.zeros(2, dtype=np.int64),
-        np.zeros(2, dtype=np.int64),
-        np.array([-1.0, 1.0]),
-        np.array([1.0, -1.0]),
-        np.array([0.5, 0.5]),
+        np.zeros((2, 2), dtype=np.int64),
+        np.array([[-1.0, 1.0], [1.0, -1.0], [0.5, 0.5]]),
         theta,
     )
     compiled, plain = np.zeros(1), np.zeros(1)

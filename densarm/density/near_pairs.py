@@ -1,0 +1,184 @@
+"""NearPairs: the geometry pairs that may be near, the only ones whose distances are queried."""
+
+import warnings
+from typing import Any
+
+import coal
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from densarm.arrays import Array
+from densarm.clearance import COAL_TOLERANCE, DISTANCE_TOLERANCE
+from densarm.compiled import compiled
+from densarm.density.joint_error import joint_error
+from densarm.distance_view import DistanceView
+from densarm.proof.swept_bound import SweptBound
+
+_ASLEEP, _AWAKE, _NEW = 0, 1, 2
+_STEPS = 8.0  # that a pair must be able to sleep: waking it costs as much as some queries
+_LONGEST_WAY = 1e4  # [rad or m], beyond which sums of small steps would round off too much
+
+
+class NearPairs:
+    r"""Queries pairs that may be near, and bounds the distances of the others from below.
+
+    A pair whose distance was d_k at a query is at least
+
+    .. math:: d_k - \sum_j r_{kj} s_j
+
+    apart since, s_j being the way that joint j has gone, in steps along straight segments, and
+    r_kj the levers of the swept bound. It sleeps, at no cost but this, until that falls to its
+    reach. All pairs wake while a slide is beyond its limits, where the levers do not hold; pairs
+    of an obstacle wake when it is moved.
+
+    Queried distances do not depend on what was queried before, to the last bit.
+
+    Args:
+        bound: the pairs and r_kj.
+    """
+
+    def __init__(self, bound: SweptBound) -> None:
+        self.clearance = clearance = bound.clearance
+        arm, geometry = clearance.arm, clearance.geometry_model
+        self._model = arm.model
+        self.data: pin.Data = arm.model.createData()
+        """Holds placements, Jacobian and mass matrix (upper triangle) of the last update."""
+        self._geometry, self._geometry_data = geometry, geometry.createData()
+        for item in geometry.geometryObjects:
+            item.geometry.computeLocalAABB()
+        with warnings.catch_warnings():
+            # Pinocchio asks for guesses from the last query, by a flag that coal calls deprecated.
+            warnings.simplefilter("ignore", DeprecationWarning)
+            for request in self._geometry_data.distanceRequests:
+                request.gjk_tolerance = request.epa_tolerance = COAL_TOLERANCE
+                request.enable_cached_gjk_guess = False
+                request.gjk_initial_guess = coal.GJKInitialGuess.BoundingVolumeGuess
+        pin.updateGeometryPlacements(
+            arm.model, self.data, geometry, self._geometry_data, pin.neutral(arm.model)
+        )
+        pin.computeDistances(geometry, self._geometry_data)
+        self._view = DistanceView(self._geometry_data)
+        self._lever = bound.lever
+        n = clearance.n_pairs
+        self.rows: Array = self._view.read()
+        """[distance, normal, point 1, point 2] (K, 10) [m]; old where a pair is asleep."""
+        self.jacobian: Array = self.data.J.reshape(6, arm.nv)
+        """World-frame joint Jacobian (6, nv) at the last update."""
+        self.sign = clearance.sign
+        """S_2 - S_1 of `Clearance` (K, nv)."""
+        self._pair_states = np.full((2, n), _NEW)  # second row: workspace
+        self.state: NDArray[np.int64] = self._pair_states[0]
+        """Nonzero where a pair is awake (K,)."""
+        self._pair_numbers = np.ones((2, n))
+        self.sensing_distance: Array = self._pair_numbers[0]
+        """σ_k > 0 (K,) [m], which may be changed in place."""
+        # After the joints have gone a way s a pair is at least level - lever @ s apart.
+        self._level = self._pair_numbers[1]
+        # Rows: the way gone, its last step, and the least and largest position of slides.
+        self._joint_numbers = np.zeros((4, arm.nv))
+        self._joint_numbers[2] = np.where(bound.slides, arm.limits.lower, -np.inf)
+        self._joint_numbers[3] = np.where(bound.slides, arm.limits.upper, np.inf)
+        self._arrays: tuple[Any, ...] = (
+            pin.neutral(arm.model),
+            arm.idx_q,
+            arm.is_circle,
+            bound.lever,
+            self.rows,
+            self._joint_numbers,
+            self._pair_numbers,
+            self._pair_states,
+        )
+
+    @property
+    def distance(self) -> Array:
+        """Distances at the last update (K,) [m]: exact for pairs awake, else lower bounds."""
+        gone = self._lever @ self._joint_numbers[0]
+        asleep = self._level - gone - DISTANCE_TOLERANCE
+        return np.where(self.state == _ASLEEP, asleep, self.rows[:, 0])
+
+    def wake_all(self) -> None:
+        """Query every pair at the next update."""
+        for k in np.flatnonzero(self.state == _ASLEEP).tolist():
+            self._geometry_data.activateCollisionPair(k)
+        self.state[:] = _NEW
+
+    def update(self, q: Array, margin: float) -> None:
+        """Query the pairs that may be within reach at q (nq,), and some others.
+
+        Args:
+            q: configuration (nq,).
+            margin: m [m]; the reach of a pair is m + σ_k.
+        """
+        geometry, data = self._geometry, self._geometry_data
+        n_awake, n_changed = _wake(q, margin, *self._arrays)
+        for k in self._pair_states[1, :n_changed].tolist() if n_changed else ():
+            if k >= 0:
+                data.activateCollisionPair(k)
+            else:
+                data.deactivateCollisionPair(~k)
+        # One pass for placements, Jacobian and M, which costs little more than the first two.
+        pin.crba(self._model, self.data, q, pin.Convention.WORLD)
+        if n_awake:
+            pin.updateGeometryPlacements(self._model, self.data, geometry, data)
+            pin.computeDistances(geometry, data)
+            if not self._view.is_direct:
+                self._view.read()
+
+
+@compiled
+def _wake(
+    q: Array,
+    margin: float,
+    q_last: Array,
+    idx_q: NDArray[np.int64],
+    is_circle: NDArray[np.bool_],
+    lever: Array,
+    rows: Array,
+    joint_numbers: Array,
+    pair_numbers: Array,
+    pair_states: NDArray[np.int64],
+) -> tuple[int, int]:
+    """Decide which pairs are awake at q; return how many, and how many changed.
+
+    Into the second row of `pair_states` go the indices of pairs that wake, and the complements of
+    those that fall asleep.
+    """
+    way, last, low, high = joint_numbers[0], joint_numbers[1], joint_numbers[2], joint_numbers[3]
+    sensing_distance, level = pair_numbers[0], pair_numbers[1]
+    state, changed = pair_states[0], pair_states[1]
+    nv = way.shape[0]
+    joint_error(q_last, q, idx_q, is_circle, last)
+    wakes_all = False
+    for j in range(nv):
+        last[j] = abs(last[j])
+        way[j] += last[j]
+        x, y = q[idx_q[j]], q_last[idx_q[j]]
+        wakes_all |= not (low[j] <= x <= high[j] and low[j] <= y <= high[j])
+        wakes_all |= not way[j] < _LONGEST_WAY
+    if wakes_all:
+        way[:] = 0.0
+    q_last[:] = q
+    n_awake, n_changed = 0, 0
+    for k in range(state.shape[0]):
+        gone = 0.0
+        for j in range(nv):
+            gone += lever[k, j] * way[j]
+        reach = margin + sensing_distance[k] + 2.0 * DISTANCE_TOLERANCE
+        before = state[k]
+        if before == _ASLEEP:
+            state[k] = _AWAKE if wakes_all or not level[k] - gone > reach else _ASLEEP
+        elif before == _NEW or wakes_all:
+            state[k] = _AWAKE
+        else:
+            step = 0.0
+            for j in range(nv):
+                step += lever[k, j] * last[j]
+            if rows[k, 0] - reach > (_STEPS + 1.0) * step:
+                state[k] = _ASLEEP
+                level[k] = rows[k, 0] + (gone - step)
+        n_awake += state[k]
+        if (before == _ASLEEP) != (state[k] == _ASLEEP):
+            changed[n_changed] = ~k if state[k] == _ASLEEP else k
+            n_changed += 1
+    return n_awake, n_changed
