@@ -1,5 +1,9 @@
 """The cost of one control step, against the calls of Pinocchio and coal that it cannot avoid."""
 
+import gc
+import itertools
+import resource
+import sys
 import time
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
@@ -26,66 +30,146 @@ from densarm.density import (
 from densarm.fields.sub_goal_chain import SensingParameters
 from densarm.proof.swept_bound import SweptBound
 from densarm.reference.reference import Reference
+from densarm.validation import positive_integer
 
 _OFF_REFERENCE = 1e-3  # of the states in every joint [rad or m]
 _BLOCK = 100  # consecutive states between two turns
+_PERCENT = (50.0, 99.0, 99.9)
 
 Step = Callable[[float, Array, Array], object]
+State = tuple[float, Array, Array]
+Percentiles = tuple[float, float, float]
 
 
 @dataclass(frozen=True)
 class StepTiming:
-    """Median times of one control step."""
+    """Times of one control step along a motion.
+
+    The bare calls are what Pinocchio and coal do for a step that asks for the distances of all
+    pairs: computeJointJacobians, updateGeometryPlacements, computeDistances and rnea.
+    """
 
     step_us: float
-    """The whole `controller.torque` [µs]."""
+    """The whole `controller.torque`, median [µs]."""
     bare_us: float
-    """The bare calls [µs]."""
+    """The bare calls on all pairs, median [µs]."""
     ratio: float
     """The first in units of the second."""
     pairs: int
     """Geometry pairs."""
+    steps: int
+    """Timed steps, and as many turns of the bare calls."""
+    step_percentiles_us: Percentiles
+    """50, 99 and 99.9 % of the step, in processor time of its thread [µs]."""
+    bare_percentiles_us: Percentiles
+    """The same of the bare calls [µs]."""
+    undisturbed_percentiles_us: Percentiles
+    """As `step_percentiles_us`, of the least time that each state took in all its visits: without
+    what other processes do to caches and clocks. A visit to all states takes 4002 steps [µs]."""
+    preparation_s: float
+    """Making the controller, its kernels loaded or compiled [s]."""
+    first_step_us: float
+    """The first step, in which all pairs are queried [µs]."""
+    memory_growth_kb: float
+    """By how much the process's peak memory grew during the steps [kB]."""
+    collections: int
+    """Runs of Python's garbage collector during the steps."""
 
     def to_json(self) -> dict[str, Any]:
         """Return the timing as JSON data."""
         return asdict(self)
 
 
-def time_step(arm: str, shapes: str = "hull", pairs: int = 64, rounds: int = 3) -> StepTiming:
+def time_step(arm: str, shapes: str = "hull", pairs: int = 64, steps: int = 20_000) -> StepTiming:
     """Time one control step of the tracking controller.
+
+    The arm swings to and fro among spheres that it passes closely, at 1 kHz, so that pairs wake
+    and fall asleep as they do at work.
 
     Args:
         arm: a known name.
         shapes: "hull" or "capsule".
         pairs: geometry pairs: arm to sphere, filled up by the arm's own.
-        rounds: how often each state is visited.
+        steps: number of steps to be timed.
 
     Raises:
         UnknownNameError: no such arm or shapes.
-        InvalidValueError: a number of pairs that the arm cannot have.
+        InvalidValueError: a number of pairs that the arm cannot have, or of steps below 1.
     """
+    steps = positive_integer("steps", steps)
     loaded = load_arm(arm, shapes=shapes)
     reference = swing(loaded)
     clearance = clearance_among_spheres(loaded, reference, pairs)
-    step, bare = _controller(clearance, reference).torque, _bare_calls(clearance)
-    states = _states(loaded, reference)
-    blocks = [states[k : k + _BLOCK] for k in range(0, len(states), _BLOCK)]
-    times: tuple[list[float], list[float]] = ([], [])
-    for block in blocks[:1] + rounds * blocks:
-        for calls, record in zip((step, bare), times, strict=True):
-            record.extend(_seconds(calls, block))
-    step_us, bare_us = (float(np.median(record[_BLOCK:])) * 1e6 for record in times)
-    return StepTiming(step_us, bare_us, step_us / bare_us, clearance.n_pairs)
+    began = time.perf_counter()
+    step = _controller(clearance, reference).torque
+    preparation = time.perf_counter() - began
+    bare, states = _bare_calls(clearance), _states(loaded, reference)
+    first = float(_seconds(step, states[:1], np.empty((2, 1)))[0, 0])
+    turns, seconds = (step, bare), np.empty((2, 2, steps))
+    warm_up = np.empty((2, _BLOCK))
+    for calls in turns:
+        _seconds(calls, states[:_BLOCK], warm_up)
+    memory, collections = _peak_memory(), _collections()
+    to_and_fro = itertools.cycle([*_blocks(states), *_blocks(states[::-1])])
+    done = 0
+    for block in to_and_fro:
+        for calls, record in zip(turns, seconds, strict=True):
+            _seconds(calls, block[: steps - done], record[:, done:])
+        done += len(block)
+        if done >= steps:
+            break
+    step_us, bare_us = (float(np.median(record[0])) * 1e6 for record in seconds)
+    return StepTiming(
+        step_us,
+        bare_us,
+        step_us / bare_us,
+        clearance.n_pairs,
+        steps,
+        _percentiles(seconds[0, 1]),
+        _percentiles(seconds[1, 1]),
+        _percentiles(_least_of_visits(seconds[0, 1], 2 * len(states))),
+        preparation,
+        1e6 * first,
+        _peak_memory() - memory,
+        _collections() - collections,
+    )
 
 
-def _seconds(step: Step, states: list[tuple[float, Array, Array]]) -> list[float]:
-    """Time every call by itself, so that what interrupts some of them leaves the median alone."""
-    seconds = []
-    for state in states:
+def _percentiles(seconds: Array) -> Percentiles:
+    low, middle, high = (1e6 * np.percentile(seconds, _PERCENT)).tolist()
+    return low, middle, high
+
+
+def _least_of_visits(seconds: Array, period: int) -> Array:
+    visits = -(-len(seconds) // period)
+    rows = np.pad(seconds, (0, visits * period - len(seconds)), constant_values=np.inf)
+    least = rows.reshape(visits, period).min(axis=0)
+    return np.asarray(least[np.isfinite(least)])
+
+
+def _blocks(states: list[State]) -> list[list[State]]:
+    return [states[k : k + _BLOCK] for k in range(0, len(states), _BLOCK)]
+
+
+def _seconds(step: Step, states: list[State], out: Array) -> Array:
+    """Time every call by itself; write wall and processor time (2, at least N) into `out`."""
+    for k, state in enumerate(states):
+        began_processor = time.thread_time()
         began = time.perf_counter()
         step(*state)
-        seconds.append(time.perf_counter() - began)
-    return seconds
+        out[0, k] = time.perf_counter() - began
+        out[1, k] = time.thread_time() - began_processor
+    return out
+
+
+def _peak_memory() -> float:
+    """Return the largest resident memory of the process so far [kB]."""
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    return peak / 1024.0 if sys.platform == "darwin" else float(peak)
+
+
+def _collections() -> int:
+    return sum(generation["collections"] for generation in gc.get_stats())
 
 
 def _controller(clearance: Clearance, reference: Reference) -> DensityTracking:
@@ -115,7 +199,7 @@ def _bare_calls(clearance: Clearance) -> Step:
     return call
 
 
-def _states(arm: Arm, reference: Reference) -> list[tuple[float, Array, Array]]:
+def _states(arm: Arm, reference: Reference) -> list[State]:
     times = reference.period * np.arange(len(reference.position))
     q = arm.configurations(reference.position + _OFF_REFERENCE)
     return list(zip(times.tolist(), q, reference.velocity, strict=True))

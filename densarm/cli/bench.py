@@ -48,13 +48,21 @@ def bench() -> None:
     show_default=True,
     help="Geometry pairs: arm to sphere, filled up by the arm's own.",
 )
+@click.option(
+    "--steps",
+    type=click.IntRange(min=1),
+    default=20_000,
+    show_default=True,
+    help="Steps to be timed, at 1 kHz along a motion.",
+)
 @output_option("--json", "FILE", "Write the result as JSON.")
-def step(arm: str, shapes: str, pairs: int, json: Path | None) -> int:
+def step(arm: str, shapes: str, pairs: int, steps: int, json: Path | None) -> int:
     """Time one control step of the density tracking controller.
 
-    The whole `controller.torque` is compared with the bare calls of Pinocchio and coal that it
-    cannot do without (computeJointJacobians, updateGeometryPlacements, computeDistances, rnea) on
-    the same pairs and states, in turns. Times are medians.
+    The whole `controller.torque` is compared with bare calls of Pinocchio and coal for the
+    distances of all pairs (computeJointJacobians, updateGeometryPlacements, computeDistances, rnea)
+    in the same states, in turns, while the arm swings to and fro among spheres. Percentiles are
+    of processor time; undisturbed ones of the least time that each state took in its visits.
 
     \b
     Example:
@@ -64,13 +72,24 @@ def step(arm: str, shapes: str, pairs: int, json: Path | None) -> int:
         report("measuring")
         from densarm.bench.step import time_step
 
-        result = time_step(arm, shapes, pairs)
+        result = time_step(arm, shapes, pairs, steps)
         if json:
             write_json(json, result.to_json())
     click.echo(f"controller.torque  {result.step_us:.1f} µs")
     click.echo(f"bare calls         {result.bare_us:.1f} µs")
     click.echo(f"ratio              {result.ratio:.2f}")
     click.echo(f"pairs              {result.pairs}")
+    for name, times in (
+        ("controller.torque", result.step_percentiles_us),
+        ("  undisturbed", result.undisturbed_percentiles_us),
+        ("bare calls", result.bare_percentiles_us),
+    ):
+        at = ", ".join(f"{time:.1f}" for time in times)
+        click.echo(f"{name:<18} {at} µs at 50, 99, 99.9 %")
+    click.echo(f"first step         {result.first_step_us:.0f} µs, all pairs queried")
+    click.echo(f"preparation        {result.preparation_s:.2f} s")
+    click.echo(f"memory growth      {result.memory_growth_kb:.0f} kB")
+    click.echo(f"collections        {result.collections}")
     return ExitStatus.SUCCESS
 
 

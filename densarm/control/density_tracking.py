@@ -69,6 +69,8 @@ class DensityTracking:
             *self._dynamics.terms,
             np.zeros((9, arm.nv)),
         )
+        # Kernels are loaded, or compiled, here rather than in the first step of a control loop.
+        self.torque(0.0, goal_distance.goal.copy(), np.zeros(arm.nv))
 
     def torque(self, t: float, q: ArrayLike, v: ArrayLike) -> Array:
         """Act as `Controller.torque`."""

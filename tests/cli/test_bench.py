@@ -12,13 +12,16 @@ GOAL = [np.cos(0.5), np.sin(0.5)]  # of the shoulder
 @pytest.mark.parametrize(("arm", "pairs"), [("two_link", 4), ("panda", 20)])
 def test_step_reports_its_keys(command, tmp_path, arm, pairs):
     path = tmp_path / "step.json"
-    done = command("bench", "step", "--arm", arm, "--pairs", pairs, "--json", path)
+    done = command("bench", "step", "--arm", arm, "--pairs", pairs, "--steps", 250, "--json", path)
     assert done.status == 0
     assert done.err == ""
     data = json.loads(path.read_text(encoding="utf-8"))
-    assert list(data) == ["step_us", "bare_us", "ratio", "pairs"]
-    assert data["pairs"] == pairs
-    assert data["step_us"] > data["bare_us"] > 0.0
+    assert list(data)[:5] == ["step_us", "bare_us", "ratio", "pairs", "steps"]
+    assert (data["pairs"], data["steps"]) == (pairs, 250)
+    for key in ("step_percentiles_us", "bare_percentiles_us", "undisturbed_percentiles_us"):
+        assert 0.0 < data[key][0] <= data[key][1] <= data[key][2]
+    assert min(data["step_us"], data["bare_us"], data["first_step_us"]) > 0.0
+    assert min(data["memory_growth_kb"], data["collections"]) >= 0
     assert data["ratio"] == pytest.approx(data["step_us"] / data["bare_us"])
     assert f"{data['ratio']:.2f}" in done.out
 
