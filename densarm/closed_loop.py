@@ -1,13 +1,12 @@
 """A scenario's closed loop, from planning to the recorded outcome."""
 
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from densarm.arm import Arm
 from densarm.arrays import Array
 from densarm.clearance import Clearance
 from densarm.control.controller import Controller
@@ -15,19 +14,20 @@ from densarm.control.density_feedback import DensityFeedback
 from densarm.control.density_tracking import DensityTracking
 from densarm.control.field_regulation import FieldRegulation
 from densarm.control.field_velocity import FieldVelocity
+from densarm.control.replanning_controller import FollowedPlan, ReplanningController
 from densarm.control.stoppable_controller import StoppableController
 from densarm.control.velocity_controller import VelocityController
+from densarm.feasibility import infeasibility
 from densarm.fields.density_field import DensityField
 from densarm.fields.speed_law import SpeedLaw
 from densarm.guides.guide import Guide, NoPath
-from densarm.holding_torque import holding_ratios, holding_torque
 from densarm.motion_plan import MotionPlan, plan_motion
 from densarm.outcome import Outcome
 from densarm.reference.infeasible_timing import InfeasibleTimingError
 from densarm.reference.reference import Reference
 from densarm.reference.reference_density import reference_density
 from densarm.scenario import ControlForm, GuideKind, Scenario
-from densarm.simulation.fixed_step_loop import FixedStepLoop, LoopEnd, Recording
+from densarm.simulation.fixed_step_loop import REACHED_POSITION, FixedStepLoop, LoopEnd, Recording
 from densarm.simulation.plant import PinocchioPlant
 from densarm.trajectory import Trajectory
 from densarm.validation import one_of
@@ -45,6 +45,8 @@ class Drive:
     """From a configuration (nq,) to why the arm rests there, as a phrase."""
     reference: Reference | None = None
     """What the controller tracks, if it does."""
+    replanned_at: Callable[[], tuple[float, ...]] = tuple
+    """Tells the times at which it planned again [s]."""
 
 
 Method = Callable[[Scenario, Clearance], Drive | NoPath]
@@ -83,8 +85,7 @@ def simulate(
         plan = plan_motion(scenario, clearance, chosen)
         if isinstance(plan, NoPath):
             return plan
-        controller = make_controller(scenario, plan)
-        return Drive(controller, plan.describe_stall, plan.reference)
+        return _drive(scenario, clearance, plan, chosen)
 
     run = run_closed_loop(scenario, by_density, on_progress)
     return replace(run, plan_time=0.0) if chosen == GuideKind.DIRECT else run
@@ -104,7 +105,7 @@ def run_closed_loop(
         The recorded run; as its `plan_time` the time that the method took.
     """
     clearance = Clearance(scenario.arm, scenario.scene)
-    if fault := _fault(scenario, clearance):
+    if fault := infeasibility(scenario, clearance):
         return _at_rest(scenario, clearance, Outcome.INFEASIBLE, fault)
     on_progress("planning")
     began = time.perf_counter()
@@ -116,6 +117,40 @@ def run_closed_loop(
     if isinstance(drive, NoPath):
         return _at_rest(scenario, clearance, Outcome.NO_PATH, drive.reason, plan_time)
     return _run(scenario, clearance, drive, plan_time, on_progress)
+
+
+def _drive(
+    scenario: Scenario, clearance: Clearance, plan: MotionPlan, guide: Guide | GuideKind
+) -> Drive:
+    """Return what drives an arm along a plan, and along others from where it is pushed."""
+
+    def followed(plan: MotionPlan) -> FollowedPlan:
+        return FollowedPlan(make_controller(scenario, plan), plan.reference, plan.describe_stall)
+
+    def plan_again(q: Array) -> FollowedPlan | None:
+        try:
+            again = plan_motion(replace(scenario, start=q), clearance, guide)
+        except InfeasibleTimingError:
+            return None
+        return None if isinstance(again, NoPath) else followed(again)
+
+    if guide == GuideKind.DIRECT:  # which has but one plan
+        first = followed(plan)
+        return Drive(first.controller, first.describe_stall, plan.reference)
+    controller = ReplanningController(
+        scenario.arm,
+        scenario.goal,
+        followed(plan),
+        plan_again,
+        patience=0.5 * scenario.simulation.stall_time,
+        tolerance=REACHED_POSITION,
+    )
+    return Drive(
+        controller,
+        controller.describe_stall,
+        plan.reference,
+        replanned_at=lambda: controller.replanned_at,
+    )
 
 
 def make_controller(scenario: Scenario, plan: MotionPlan) -> StoppableController:
@@ -193,7 +228,8 @@ def _run(
         outcome=outcome,
         detail=detail,
         plan_time=plan_time,
-        tracking_error=_tracking_error(scenario, drive.reference, recording),
+        tracking_error=_tracking_error(scenario, drive, recording),
+        replanned_at=drive.replanned_at(),
     )
 
 
@@ -217,48 +253,13 @@ def _smallest_distances(clearance: Clearance, q: Array) -> tuple[Array, NDArray[
     return smallest, pair
 
 
-def _tracking_error(
-    scenario: Scenario, reference: Reference | None, recording: Recording
-) -> float | None:
-    if reference is None:
+def _tracking_error(scenario: Scenario, drive: Drive, recording: Recording) -> float | None:
+    reference = drive.reference
+    if reference is None or drive.replanned_at():
         return None
     arm = scenario.arm
     wanted = np.array([reference.sample(t).position for t in recording.time])
     return float(np.abs(arm.difference(arm.configurations(wanted), recording.q)).max())
-
-
-def _fault(scenario: Scenario, clearance: Clearance) -> str:
-    """Return what makes start or goal infeasible, as a phrase; empty if nothing does."""
-    ends = {"start": scenario.start, "goal": scenario.goal}
-    return "; ".join(
-        f"{name}: {fault}"
-        for name, q in ends.items()
-        for fault in [
-            *_limit_faults(scenario, q),
-            *_holding_faults(scenario.arm, q),
-            *_contact_faults(scenario, clearance, q),
-        ]
-    )
-
-
-def _limit_faults(scenario: Scenario, q: Array) -> Iterator[str]:
-    limits, names = scenario.arm.limits, scenario.arm.joint_names
-    angles = scenario.arm.angles(q)
-    for j in np.flatnonzero((angles < limits.lower) | (angles > limits.upper)):
-        allowed = f"[{limits.lower[j]:.4g}, {limits.upper[j]:.4g}]"
-        yield f"joint {names[j]!r} at {angles[j]:.4g} is outside {allowed}"
-
-
-def _holding_faults(arm: Arm, q: Array) -> Iterator[str]:
-    if holding_ratios(arm, q).max() > 1.0:
-        yield holding_torque(arm, q)
-
-
-def _contact_faults(scenario: Scenario, clearance: Clearance, q: Array) -> Iterator[str]:
-    distance = clearance.distances(q)
-    for k in np.argsort(distance)[: int((distance <= scenario.control.margin).sum())]:
-        pair, gap = " and ".join(clearance.pairs[k]), distance[k] * 1e3
-        yield f"{pair} overlap by {-gap:.3g} mm" if gap <= 0.0 else f"{pair} are {gap:.3g} mm apart"
 
 
 def _at_rest(

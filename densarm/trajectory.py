@@ -43,7 +43,9 @@ class Trajectory:
     plan_time: float = 0.0
     """Wall-clock time of planning [s]; zero for the direct guide."""
     tracking_error: float | None = field(default=None)
-    """Largest joint error against the reference [rad or m]; None without a reference."""
+    """Largest joint error against the reference [rad or m]; None without one, or with several."""
+    replanned_at: tuple[float, ...] = ()
+    """Times at which the arm had lost its plan, and there was a new one from where it was [s]."""
 
     def verify(self) -> Certificate:
         """Return what is proved about the run, computed anew from the record."""
@@ -105,6 +107,7 @@ class Trajectory:
             "detail": self.detail,
             "plan_time_s": self.plan_time,
             "tracking_error_rad": self.tracking_error,
+            "replanned_at_s": list(self.replanned_at),
         }
         with atomic_file(Path(path)) as file:
             np.savez_compressed(
@@ -136,6 +139,7 @@ class Trajectory:
                 detail=str(result["detail"]),
                 plan_time=float(result["plan_time_s"]),
                 tracking_error=None if deviation is None else float(deviation),
+                replanned_at=tuple(float(time) for time in result.get("replanned_at_s", ())),
             )._checked()
         except OSError as error:
             raise FileContentError(path, error.strerror or "cannot be read") from None

@@ -43,7 +43,7 @@ LAYERS = (
     ("control",),
     ("simulation",),
     ("scenario",),
-    ("motion_plan",),
+    ("motion_plan", "feasibility"),
     ("certificates",),
     ("trajectory",),
     ("closed_loop",),

@@ -25,8 +25,8 @@ class ProblemResult:
     """Largest torque in units of its limit."""
     plan_time_s: float | None = None
     """Wall-clock time of planning [s]."""
-    first_motion_s: float | None = None
-    """Wall-clock time to the first torque [s], where the record tells it."""
+    preparation_time_s: float | None = None
+    """Wall-clock time from the scenario to the first torque [s], where the record tells it."""
     motion_s: float | None = None
     """Simulated time from which on the arm was at the goal and at rest [s]."""
     optimal_s: float | None = None

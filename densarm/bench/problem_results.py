@@ -22,7 +22,7 @@ PERCENTILES = (50, 95, 98)
 
 MEASURES = (
     "plan_time_s",
-    "first_motion_s",
+    "preparation_time_s",
     "duration_s",
     "motion_s",
     "optimal_ratio",

@@ -69,7 +69,7 @@ def _row(part: ProblemResults, direct: ProblemResults | None) -> list[str]:
         str(part.total - reached - sum(counts)),
         str(part.total),
         " ".join(f"{value:.2f}" for value in planning),
-        _median(part, "first_motion_s"),
+        _median(part, "preparation_time_s"),
         _median(part, "motion_s"),
         _median(part, "optimal_ratio"),
         _median(part, "path_length_rad"),

@@ -60,6 +60,8 @@ def _figures(run: Trajectory) -> dict[str, str]:
     }
     if run.tracking_error is not None:
         figures["tracking error"] = f"{run.tracking_error:.2g} rad"
+    if run.replanned_at:
+        figures["planned again"] = ", ".join(f"at t = {time:.3f} s" for time in run.replanned_at)
     return figures
 
 

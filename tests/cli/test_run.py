@@ -72,7 +72,7 @@ def test_direct_guide_is_stuck_at_the_critical_point(command, tmp_path):
     assert done.status == 1
     assert done.err == ""
     assert "stuck: " in done.out
-    assert "critical point" in done.out
+    assert "saddle of the density" in done.out
     data = json.loads((tmp_path / "run.json").read_text(encoding="utf-8"))
     assert data["outcome"] == "stuck"
     assert data["certified"] is False
