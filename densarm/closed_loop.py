@@ -47,6 +47,8 @@ class Drive:
     """What the controller tracks, if it does."""
     replanned_at: Callable[[], tuple[float, ...]] = tuple
     """Tells the times at which it planned again [s]."""
+    plan_time: float = 0.0
+    """Wall-clock time that its guide took [s], if it has one."""
 
 
 Method = Callable[[Scenario, Clearance], Drive | NoPath]
@@ -102,21 +104,22 @@ def run_closed_loop(
         on_progress: told what is being done.
 
     Returns:
-        The recorded run; as its `plan_time` the time that the method took.
+        The recorded run; as its `preparation_time` the time until the method was ready.
     """
+    began = time.perf_counter()
     clearance = Clearance(scenario.arm, scenario.scene)
     if fault := infeasibility(scenario, clearance):
         return _at_rest(scenario, clearance, Outcome.INFEASIBLE, fault)
     on_progress("planning")
-    began = time.perf_counter()
     try:
         drive = method(scenario, clearance)
     except InfeasibleTimingError as error:
         return _at_rest(scenario, clearance, Outcome.INFEASIBLE, str(error))
-    plan_time = time.perf_counter() - began
+    elapsed = time.perf_counter() - began
     if isinstance(drive, NoPath):
-        return _at_rest(scenario, clearance, Outcome.NO_PATH, drive.reason, plan_time)
-    return _run(scenario, clearance, drive, plan_time, on_progress)
+        return _at_rest(scenario, clearance, Outcome.NO_PATH, drive.reason, elapsed)
+    run = _run(scenario, clearance, drive, on_progress)
+    return replace(run, plan_time=drive.plan_time, preparation_time=elapsed)
 
 
 def _drive(
@@ -149,6 +152,7 @@ def _drive(
         controller,
         controller.describe_stall,
         plan.reference,
+        plan_time=plan.guide_time,
         replanned_at=lambda: controller.replanned_at,
     )
 
@@ -197,7 +201,6 @@ def _run(
     scenario: Scenario,
     clearance: Clearance,
     drive: Drive,
-    plan_time: float,
     on_progress: OnProgress,
 ) -> Trajectory:
     arm, simulation = scenario.arm, scenario.simulation
@@ -227,9 +230,7 @@ def _run(
         clearance=smallest[:last],
         outcome=outcome,
         detail=detail,
-        plan_time=plan_time,
-        tracking_error=_tracking_error(scenario, drive, recording),
-        replanned_at=drive.replanned_at(),
+        return _drive(scenario, clearance, plan, chosen)
     )
 
 

@@ -1,5 +1,6 @@
 """MotionPlan: from a guide's sub-goals to what a controller follows."""
 
+import time
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -46,6 +47,8 @@ class MotionPlan:
     """The swept bound under the scenario's margin."""
     reference: Reference | None = None
     """The timed trajectory of the planning system, to where it got, if it is to be tracked."""
+    guide_time: float = 0.0
+    """Wall-clock time that the guide took [s]."""
 
     @cached_property
     def guided(self) -> GuidedDensity:
@@ -83,6 +86,7 @@ def plan_motion(
     depart, arrive = (_inside_limits(bound, q) for q in (start, goal))
     ends = min(bound.slack(q).min(initial=np.inf) for q in (start, depart, arrive))
     room = max(0.0, min(control.path_margin, _END_SHARE * ends))
+    began = time.perf_counter()
     for share in _ROOM_SHARES:
         path_bound = bound.with_margin(control.margin + share * room)
         path = _chosen(guide, scenario, path_bound).plan(depart, arrive, scenario.seed)
@@ -90,7 +94,7 @@ def plan_motion(
             break
     if isinstance(path, NoPath):
         return path
-    plan = MotionPlan(scenario, path, bound)
+    plan = MotionPlan(scenario, path, bound, guide_time=time.perf_counter() - began)
     if control.form != ControlForm.TRACKING:
         return plan
     kept = 0.5 * (path_bound.margin - control.margin) if path.is_clear else 0.0

@@ -41,7 +41,10 @@ class Trajectory:
     detail: str = ""
     """What stood in the way, in a phrase; empty when reached."""
     plan_time: float = 0.0
-    """Wall-clock time of planning [s]; zero for the direct guide."""
+    """Wall-clock time that the guide took [s]; zero for the direct guide."""
+    preparation_time: float = 0.0
+    """Wall-clock time from the scenario to the first torque, planning included [s]; zero where
+    nothing moved."""
     tracking_error: float | None = field(default=None)
     """Largest joint error against the reference [rad or m]; None without one, or with several."""
     replanned_at: tuple[float, ...] = ()
@@ -90,6 +93,7 @@ class Trajectory:
             "goal_error_rad": self.goal_error,
             "peak_torque_ratio": self.peak_torque_ratio,
             "plan_time_s": self.plan_time,
+            "preparation_time_s": self.preparation_time,
             "certified": self.certified,
         }
 
@@ -106,6 +110,7 @@ class Trajectory:
             "outcome": str(self.outcome),
             "detail": self.detail,
             "plan_time_s": self.plan_time,
+            "preparation_time_s": self.preparation_time,
             "tracking_error_rad": self.tracking_error,
             "replanned_at_s": list(self.replanned_at),
         }
@@ -138,6 +143,7 @@ class Trajectory:
                 outcome=Outcome(result["outcome"]),
                 detail=str(result["detail"]),
                 plan_time=float(result["plan_time_s"]),
+                preparation_time=float(result["preparation_time_s"]),
                 tracking_error=None if deviation is None else float(deviation),
                 replanned_at=tuple(float(time) for time in result.get("replanned_at_s", ())),
             )._checked()

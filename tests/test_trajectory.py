@@ -52,7 +52,7 @@ def test_round_trip_is_exact(swing_up_run, tmp_path):
     loaded = Trajectory.load(tmp_path / "run.npz")
     for name in ARRAYS:
         np.testing.assert_array_equal(getattr(loaded, name), getattr(swing_up_run, name))
-    for name in ("outcome", "detail", "plan_time", "tracking_error"):
+    for name in ("outcome", "detail", "plan_time", "preparation_time", "tracking_error"):
         assert getattr(loaded, name) == getattr(swing_up_run, name)
     assert loaded.scenario.to_json() == swing_up_run.scenario.to_json()
     assert loaded.summary() == swing_up_run.summary()
@@ -213,7 +213,7 @@ def test_scenario_that_is_not_one(tmp_path, content):
 
 def test_result_that_is_not_one(tmp_path, content):
     whole = json.loads(str(content["result"]))
-    for key in ("outcome", "plan_time_s", "tracking_error_rad"):
+    for key in ("outcome", "plan_time_s", "preparation_time_s", "tracking_error_rad"):
         text = json.dumps({**whole, key: "x"})
         error_of(written(tmp_path / "run.npz", {**content, "result": np.array(text)}))
     error_of(written(tmp_path / "run.npz", {**content, "result": np.array("[]")}))
@@ -256,6 +256,7 @@ def test_summary(swing_up_run):
         "goal_error_rad",
         "peak_torque_ratio",
         "plan_time_s",
+        "preparation_time_s",
         "certified",
     ]
     assert json.loads(json.dumps(summary)) == summary
@@ -263,6 +264,7 @@ def test_summary(swing_up_run):
     assert summary["certified"] is True
     assert 0.0 < summary["min_clearance_m"] == swing_up_run.clearance.min()
     assert summary["goal_error_rad"] <= 0.01
+    assert 0.0 < summary["plan_time_s"] < summary["preparation_time_s"]
     assert 0.0 < summary["peak_torque_ratio"] <= 1.0
 
 

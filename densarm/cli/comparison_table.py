@@ -20,7 +20,7 @@ _COLUMNS = {
     "path\n[rad]": ("path_length_rad", 1.0, ".2f"),
     "clear\n[mm]": ("min_clearance_m", 1e3, ".1f"),
     "effort\n[N²m²s]": ("effort", 1.0, ".0f"),
-    "plan\n[s]": ("plan_time_s", 1.0, ".2f"),
+    "ready\n[s]": ("preparation_time_s", 1.0, ".2f"),
     "step\n[µs]": ("step_us", 1.0, ".0f"),
 }
 _WIDTH = 90  # characters, at least, so that no number is cut; most tables need 80

@@ -56,7 +56,7 @@ def _figures(run: Trajectory) -> dict[str, str]:
         "min clearance": f"{smallest * 1e3:.4g} mm" if np.isfinite(smallest) else "no pairs",
         "goal error": f"{run.goal_error:.2g} rad",
         "peak torque": f"{run.peak_torque_ratio:.0%} of the limits",
-        "planning": f"{run.plan_time:.2f} s",
+        "planning": f"{run.plan_time:.3f} s, ready after {run.preparation_time:.2f} s",
     }
     if run.tracking_error is not None:
         figures["tracking error"] = f"{run.tracking_error:.2g} rad"

@@ -49,6 +49,8 @@ class MethodRun:
     effort: float | None = None
     """∫ ‖τ‖² dt [N²m²s]."""
     plan_time_s: float | None = None
+    """Wall-clock time that its guide took [s]; zero without one."""
+    preparation_time_s: float | None = None
     """Wall-clock time before the first torque [s]."""
     step_us: float | None = None
     """Median wall-clock time of one call of the controller [µs]; None where it had none."""
@@ -64,6 +66,7 @@ MEASURES = (
     "min_clearance_m",
     "effort",
     "plan_time_s",
+    "preparation_time_s",
     "step_us",
 )
 """What is measured on a run, as `MethodRun` calls it."""
@@ -244,6 +247,7 @@ def _measured(run: Trajectory, step_us: float | None) -> MethodRun:
         min_clearance_m=smallest if np.isfinite(smallest) else None,
         effort=float((run.tau[:-1] ** 2).sum() * dt),
         plan_time_s=run.plan_time,
+        preparation_time_s=run.preparation_time,
         step_us=step_us,
     )
 

@@ -113,7 +113,8 @@ def _by_density(
     plan = plan_motion(scenario, clearance, guide)
     if isinstance(plan, NoPath):
         return plan
-    return Drive(make_controller(scenario, plan), plan.describe_stall, plan.reference)
+    controller = make_controller(scenario, plan)
+    return Drive(controller, plan.describe_stall, plan.reference, plan.guide_time)
 
 
 def _shared(scenario: Scenario, clearance: Clearance) -> tuple[Barriers, GoalDistance, SpeedLaw]:

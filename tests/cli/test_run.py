@@ -12,6 +12,7 @@ KEYS = [
     "goal_error_rad",
     "peak_torque_ratio",
     "plan_time_s",
+    "preparation_time_s",
     "certified",
 ]
 BALL = """
