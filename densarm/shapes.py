@@ -1,5 +1,6 @@
 """Collision shapes whose distance coal can differentiate, and what becomes of the others."""
 
+from functools import lru_cache
 from itertools import product
 
 import coal
@@ -20,6 +21,7 @@ _CAPSULE_TOLERANCE = 1e-4
 _FLATNESS = 1e-6  # thickness, over the largest coordinate, of points that count as in one plane
 _FARTHEST = 1e6  # [m]
 _CELLS = 64  # along each side of a mesh whose hull is too fine for coal
+_KEPT = 512  # hulls of boxes and cylinders, the last ones made
 
 
 def convex_hull(points: Array) -> coal.ConvexBase:
@@ -34,6 +36,7 @@ def convex_hull(points: Array) -> coal.ConvexBase:
     return _hull(np.asarray(points, dtype=np.float64), "the set of points")
 
 
+@lru_cache(maxsize=_KEPT)
 def circumscribed_cylinder(radius: float, length: float) -> coal.ConvexBase:
     """Return a prism that encloses the cylinder along z with the same two ends.
 
@@ -57,8 +60,7 @@ def box_hull(size: ArrayLike) -> coal.ConvexBase:
     Args:
         size: full side lengths x y z [m].
     """
-    corners = np.array(list(product((-0.5, 0.5), repeat=3)))
-    return convex_hull(corners * np.asarray(size, dtype=np.float64))
+    return _box_hull(*np.asarray(size, dtype=np.float64).tolist())
 
 
 def differentiable_geometry(
@@ -155,6 +157,11 @@ def _hull(points: Array, name: str) -> coal.ConvexBase:
         return _qhull(points)
     except RuntimeError:  # coal takes 255 neighbours of a corner; a round face can have more
         return _qhull(_coarsened(points))
+
+
+@lru_cache(maxsize=_KEPT)
+def _box_hull(x: float, y: float, z: float) -> coal.ConvexBase:
+    return convex_hull(np.array(list(product((-0.5, 0.5), repeat=3))) * [x, y, z])
 
 
 def _qhull(points: Array) -> coal.ConvexBase:

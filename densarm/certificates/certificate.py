@@ -15,7 +15,7 @@ from densarm.scenario import Scenario
 from densarm.simulation.fixed_step_loop import REACHED_POSITION, REACHED_VELOCITY
 
 _ROUNDING = 1e-9  # [rad, rad/s, N·m], room for rounding in comparisons with limits
-_RESTS = 50  # ends of brakes at most whose distances are told
+_RESTS = 20  # ends of brakes at most whose distances are told
 
 
 @dataclass(frozen=True)

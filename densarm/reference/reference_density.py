@@ -14,7 +14,7 @@ from densarm.fields.sub_goal_chain import SensingParameters
 from densarm.proof.swept_bound import SweptBound
 from densarm.reference.reference import Reference
 
-_SAMPLES = 200  # of the reference, at which distances are computed
+_INTERVAL = 0.02  # [s] of the reference between computed distances
 _SMALLEST = 1e-6  # [m or rad], sensing distance where the reference leaves no room
 
 
@@ -38,7 +38,7 @@ def reference_density(
         kappa: of the goal distance.
     """
     arm = bound.arm
-    every = max(1, len(reference.position) // _SAMPLES)
+    every = max(1, round(_INTERVAL / reference.period))
     angles = np.vstack([reference.position[::every], reference.position[-1:]])
     configurations = arm.configurations(angles)
     slack = np.array([bound.slack(q) for q in configurations]).min(axis=0)
