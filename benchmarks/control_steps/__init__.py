@@ -1,0 +1,1 @@
+"""Control steps of densarm and its peers on one task."""

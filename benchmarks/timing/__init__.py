@@ -1,0 +1,1 @@
+"""Times taken in turns, their spread, and where they were taken."""

@@ -1,0 +1,27 @@
+"""Spread: how a measured quantity is distributed."""
+
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class Spread:
+    """Median and percentiles of a sample."""
+
+    p5: float
+    median: float
+    p95: float
+    p99: float
+    p999: float
+    largest: float
+
+    @classmethod
+    def of(cls, sample: Sequence[float], scale: float = 1.0) -> "Spread":
+        values = np.asarray(sample) * scale
+        at = np.percentile(values, [5.0, 50.0, 95.0, 99.0, 99.9, 100.0])
+        return cls(*at.tolist())
+
+    def to_json(self) -> dict[str, float]:
+        return asdict(self)
