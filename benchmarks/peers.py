@@ -26,7 +26,8 @@ VERSIONS = (
 )
 UNEQUAL = """\
 What is not equal: densarm and cbfpy command torques, pin-pink and mink velocities, without
-dynamics. densarm, pin-pink and cbfpy measure every pair, mink those within its detection distance.
+dynamics. pin-pink and cbfpy measure every pair, mink those within its detection distance, densarm
+in its command those that may have come near since it last looked.
 pin-pink tests all pairs for collision too, at every update of its configuration. pin-pink and mink
 follow the end effector's pose with a weak pull to the joint positions, the others the joints."""
 
@@ -86,8 +87,8 @@ def main(arguments: list[str] | None = None) -> None:
     parser.add_argument("--spheres", type=int, default=32)
     parser.add_argument("--peers", nargs="*", default=["mink", "pin-pink", "cbfpy"])
     parser.add_argument("--tasks", nargs="*", default=[f"{a}-{b}" for a, b in TASKS])
-    parser.add_argument("--blocks", type=int, nargs=2, default=(6, 10), help="number and length")
-    parser.add_argument("--rounds", type=int, default=3)
+    parser.add_argument("--blocks", type=int, nargs=2, default=(10, 20), help="number and length")
+    parser.add_argument("--rounds", type=int, default=1)
     parser.add_argument("--json", type=Path)
     parser.add_argument("--figure", type=Path, help="PNG of the first task")
     options = parser.parse_args(arguments)

@@ -43,8 +43,8 @@ def compare(
     n_spheres: int,
     scene: str,
     peers: list[str],
-    blocks: tuple[int, int] = (6, 10),
-    rounds: int = 3,
+    blocks: tuple[int, int] = (10, 20),
+    rounds: int = 1,
     on_progress: Callable[[str], None] = lambda _: None,
 ) -> dict[str, Any]:
     """Return every step's times and ratios as JSON data.

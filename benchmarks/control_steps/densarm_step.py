@@ -5,14 +5,16 @@ from densarm.arrays import Array
 from densarm.control.density_tracking import DensityTracking
 from densarm.control.gains import Gains
 from densarm.density import (
-    ClearanceSet,
     DensityParameters,
     JointLimitSet,
     NavigationDensity,
+    NearClearanceSet,
+    NearPairs,
     TorusDistance,
     UnsafeSet,
 )
 from densarm.fields.sub_goal_chain import SensingParameters
+from densarm.proof.swept_bound import SweptBound
 
 
 class DensarmStep:
@@ -22,7 +24,7 @@ class DensarmStep:
         self._task = task
         arm, sensing = task.arm, SensingParameters()
         unsafe: list[UnsafeSet] = [
-            ClearanceSet(task.clearance, 0.0, sensing.distance),
+            NearClearanceSet(NearPairs(SweptBound(task.clearance)), 0.0, sensing.distance),
             JointLimitSet(arm, sensing.joint),
         ]
         goal_distance = TorusDistance(arm, arm.configuration(task.reference.position[-1]))
@@ -30,8 +32,9 @@ class DensarmStep:
         self._controller = DensityTracking(arm, density, task.reference, Gains())
         self.name = "densarm"
         self.set_up = (
-            f"DensityTracking.torque, sensing distance {1e3 * sensing.distance:.0f} mm,"
-            " joint limits, torque and acceleration limits; the command is a torque"
+            f"DensityTracking.torque, sensing distance {1e3 * sensing.distance:.0f} mm; joint,"
+            " torque and acceleration limits; pairs that cannot be near sleep in the command, but"
+            " not where distances are measured alone; the command is a torque"
         )
 
     def measure(self, k: int) -> object:

@@ -44,9 +44,12 @@ def ratios(times: Sequence[Sequence[float]], unit: Sequence[Sequence[float]]) ->
 
 
 def blocks_of(states: range, count: int, length: int) -> list[range]:
-    """Return ranges of consecutive states, evenly spread."""
-    length = min(length, len(states))
-    begins = np.linspace(0, len(states) - length, count).astype(int).tolist()
+    """Return ranges from the middle of the states, one after the other without a gap.
+
+    What a step remembers of the one before then counts as it does at work.
+    """
+    first = max(0, (len(states) - count * length) // 2)
+    begins = range(first, first + count * length, length)
     return [states[begin : begin + length] for begin in begins]
 
 

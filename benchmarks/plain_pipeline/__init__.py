@@ -1,0 +1,1 @@
+"""The pipeline that most would write: RRT-Connect, TOPP-RA, computed torque."""
