@@ -2,32 +2,27 @@
 
     python benchmarks/step_sizes.py --steps 100000 --json step_sizes.json --figure step_sizes.png
 
-Each row is what `densarm bench step` measures for Panda in a process of its own, so that memory is
+Each row is what `densarm bench step` measures for Panda, in a process of its own, so that memory is
 that row's alone. 10⁵ steps give the 99.9 % a hundred samples; 10⁶ show whether memory grows.
 """
 
 import argparse
-import json
-import subprocess
-import sys
+from multiprocessing import get_context
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any
 
 from timing.surroundings import print_surroundings, surroundings
 
+from densarm.bench.step import time_step
 from densarm.cli.json_file import write_json
 
 PAIRS = [8, 16, 32, 64, 128, 256, 512, 1024]
 
 
 def measure(shapes: str, pairs: int, steps: int) -> dict[str, Any]:
-    with TemporaryDirectory() as folder:
-        file = Path(folder) / "step.json"
-        command = [sys.executable, "-m", "densarm", "bench", "step", "--shapes", shapes]
-        command += ["--pairs", str(pairs), "--steps", str(steps), "--json", str(file)]
-        subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
-        return {"shapes": shapes, **json.loads(file.read_text())}
+    with get_context("spawn").Pool(1) as process:
+        timing = process.apply(time_step, ("panda", shapes, pairs, steps))
+    return {"shapes": shapes, **timing.to_json()}
 
 
 def print_row(row: dict[str, Any]) -> None:

@@ -11,7 +11,7 @@ from densarm.clearance import Clearance
 from densarm.scenario import Scenario
 
 RESOLUTION = 0.01  # OMPL's default: of the extent of the joint space, between checked states
-_TIME = 10.0  # for the search [s]
+_TIME = 30.0  # for the search [s]
 _STEP = 0.1  # between waypoints at most [rad]
 
 
