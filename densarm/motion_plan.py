@@ -8,6 +8,8 @@ import numpy as np
 
 from densarm.arrays import Array
 from densarm.clearance import Clearance
+from densarm.density.goal_distance import GoalDistance, TorusDistance
+from densarm.density.inertia_distance import InertiaDistance
 from densarm.fields.guided_density import GuidedDensity
 from densarm.fields.planning_system import PlanningSystem
 from densarm.fields.sub_goal_chain import SubGoalChain
@@ -59,8 +61,7 @@ class MotionPlan:
             SubGoalChain(self.bound, self.path, scenario.sensing),
             scenario.control.margin,
             scenario.density,
-            scenario.control.kappa,
-            _weights(scenario),
+            _goal_distance(scenario),
         )
 
     def describe_stall(self, q: Array) -> str:
@@ -139,12 +140,11 @@ def _inside_limits(bound: SweptBound, q: Array) -> Array:
     return inside if bound.segment_is_clear(q, inside) else q
 
 
-def _weights(scenario: Scenario) -> Array | None:
-    """Return weights of V: in proportion to inertia where the density is a torque, else none."""
-    if scenario.control.form != ControlForm.PLAIN:
-        return None
-    inertia = scenario.arm.mass_matrix(scenario.goal).diagonal()
-    return np.asarray(inertia / inertia.max())
+def _goal_distance(scenario: Scenario) -> GoalDistance:
+    """Return V: in the metric of the inertia where the density is a torque."""
+    if scenario.control.form == ControlForm.PLAIN:
+        return InertiaDistance(scenario.arm, scenario.goal)
+    return TorusDistance(scenario.arm, scenario.goal, kappa=scenario.control.kappa)
 
 
 def _reference(

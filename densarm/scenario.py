@@ -70,7 +70,7 @@ class ControlParameters:
     path_margin: float = 0.005
     """Distance that paths keep beyond m where start and goal leave so much [m]."""
     kappa: float = 1.0
-    """κ of the goal distance, between product and sum."""
+    """κ of the goal distance, between product and sum; the plain form has the sum."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "form", ControlForm(one_of("form", self.form, list(ControlForm))))

@@ -24,7 +24,7 @@ class ProblemResult:
     peak_torque_ratio: float | None = None
     """Largest torque in units of its limit."""
     plan_time_s: float | None = None
-    """Wall-clock time of planning [s]."""
+    """Wall-clock time that the guide took [s]."""
     preparation_time_s: float | None = None
     """Wall-clock time from the scenario to the first torque [s], where the record tells it."""
     motion_s: float | None = None

@@ -3,12 +3,12 @@
 from dataclasses import replace
 
 from densarm.clearance import Clearance
-from densarm.density import NavigationDensity, TorusDistance
+from densarm.density import GoalDistance, NavigationDensity
 from densarm.motion_plan import MotionPlan, plan_motion
 from densarm.scenario import ControlForm, GuideKind, Scenario
 
 
-def plain_density(scenario: Scenario) -> NavigationDensity[TorusDistance]:
+def plain_density(scenario: Scenario) -> NavigationDensity[GoalDistance]:
     """Return the density that drives a scenario's arm straight to its goal, as [ZNV] has it.
 
     Args:

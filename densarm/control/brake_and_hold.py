@@ -72,5 +72,4 @@ class BrakeAndHold:
         if self._rest is not None:
             error = self._arm.difference(self._rest, q)
             return self._dynamics.torque(-self._gains.velocity * v, -self._gains.position * error)
-        longest = self._time_left if math.isfinite(self._time_left) else 0.0
-        return self._dynamics.torque(-v / max(longest, self._shortest), np.zeros_like(v))
+        return self._dynamics.brake_torque(v, self._time_left, self._shortest)

@@ -22,8 +22,8 @@ class DensityFeedback:
 
     d cancels the nonlinearities and damps. The torque u_ρ points along ∇ρ itself, so that the arm
     follows M⁻¹∇ρ, the gradient in the metric of its inertia, at the speed of the speed law; the
-    inverse dynamics controllers follow ∇ρ. Weights of V in proportion to the joints' inertia keep
-    the two close.
+    inverse dynamics controllers follow ∇ρ. With V in that metric too, an `InertiaDistance`, both
+    lead straight from sub-goal to sub-goal, and differ where obstacles are sensed.
 
     Args:
         arm: the arm.
@@ -39,7 +39,7 @@ class DensityFeedback:
         self._field = field
         self._gain = gains.velocity
         self._dynamics = InverseDynamics(arm, HELD_SHARE * arm.limits.acceleration)
-        self._guard = StoppingGuard(arm, field.speed_law, period)
+        self._guard = StoppingGuard(arm, field.speed_law, gains, period)
         self._metric = 1.0 / arm.mass_matrix(field.guided.chain.q[-1]).diagonal().max()
 
     def torque(self, t: float, q: ArrayLike, v: ArrayLike) -> Array:

@@ -35,7 +35,7 @@ class FieldRegulation:
         self._field = field
         self._gain = gains.velocity
         self._dynamics = InverseDynamics(arm, HELD_SHARE * arm.limits.acceleration)
-        self._guard = StoppingGuard(arm, field.speed_law, period)
+        self._guard = StoppingGuard(arm, field.speed_law, gains, period)
 
     def torque(self, t: float, q: ArrayLike, v: ArrayLike) -> Array:
         """Act as `Controller.torque`."""

@@ -1,5 +1,7 @@
 """InverseDynamics: torque for wanted accelerations, within the limits of the arm."""
 
+import math
+
 import numpy as np
 import pinocchio as pin
 
@@ -46,6 +48,17 @@ class InverseDynamics:
         """Return M (nv, nv) at the updated state."""
         upper = np.triu(self._mass)
         return np.asarray(upper + np.triu(upper, 1).T)
+
+    def brake_torque(self, v: Array, duration: float, shortest: float) -> Array:
+        """Return the torque (nv,) of the straight brake, at the updated state.
+
+        Args:
+            v: velocity (nv,) [rad/s or m/s].
+            duration: time to go [s]; if infinite the brake is as hard as the limits allow.
+            shortest: time below which it does not count as shorter [s].
+        """
+        longest = max(duration, shortest) if math.isfinite(duration) else shortest
+        return self.torque(-v / longest, np.zeros_like(v))
 
     def torque(self, brake: Array, attract: Array) -> Array:
         """Return torque (nv,) for accelerations (nv,) [rad/s²] at the updated state."""

@@ -5,7 +5,9 @@ import pinocchio as pin
 
 from densarm.arm import Arm
 from densarm.arrays import Array
+from densarm.control.gains import Gains
 from densarm.control.inverse_dynamics import InverseDynamics
+from densarm.control.jerk_limit import JerkLimit
 from densarm.fields.speed_law import SpeedLaw
 from densarm.proof.straight_brake import StraightBrake
 
@@ -13,26 +15,29 @@ from densarm.proof.straight_brake import StraightBrake
 class StoppingGuard:
     """Replaces a torque by the straight brake where, after it, the brake would not be proved clear.
 
-    From a state with a clear brake the next one has a clear brake too: if not after the torque
-    that is asked for, then after the first part of the brake itself.
+    Before, it limits the jerk, in the time 1 / K_v; the brake's is not limited. From a state with
+    a clear brake the next one has a clear brake too: if not after the torque that is asked for,
+    then after the first part of the brake itself.
 
     Args:
         arm: the arm.
         speed_law: tells from where the arm can stop.
+        gains: K_v is used.
         period: time that a torque is held [s].
     """
 
-    def __init__(self, arm: Arm, speed_law: SpeedLaw, period: float) -> None:
+    def __init__(self, arm: Arm, speed_law: SpeedLaw, gains: Gains, period: float) -> None:
         self._arm = arm
         self._data = arm.model.createData()
         self._speed_law = speed_law
         self._period = period
         self._brake = StraightBrake(arm)
+        self._jerk = JerkLimit(arm.limits.acceleration, 1.0 / gains.velocity, period)
 
     def torque(
         self, dynamics: InverseDynamics, q: Array, v: Array, wanted: Array, distance: Array
     ) -> Array:
-        """Return the wanted torque (nv,) [N·m or N], or that of the brake.
+        """Return the wanted torque (nv,) [N·m or N] as far as the jerk allows, or the brake's.
 
         Args:
             dynamics: updated at q (nq,) and v (nv,).
@@ -41,23 +46,22 @@ class StoppingGuard:
             wanted: torque that is asked for (nv,) [N·m or N].
             distance: signed distances of all pairs at q (K,) [m].
         """
-        a = pin.aba(self._arm.model, self._data, q, v, wanted)
-        v_next = v + self._period * a
+        a = self._acceleration(q, v, wanted)
+        limited = self._jerk.limited(a)
+        tau = wanted if limited is a else self._torque(q, v, limited)
+        v_next = v + self._period * limited
         motion = self._period * np.maximum(np.abs(v), np.abs(v_next))
         q_next = self._arm.integrate(q, self._period * v_next)
-        if self._speed_law.can_stop(q_next, v_next, distance, motion):
-            return wanted
-        return brake_torque(dynamics, v, self._brake.duration(q, v), self._period)
+        if not self._speed_law.can_stop(q_next, v_next, distance, motion):
+            tau = dynamics.brake_torque(v, self._brake.duration(q, v), self._period)
+            limited = self._acceleration(q, v, tau)
+        self._jerk.last = limited
+        return tau
 
+    def _acceleration(self, q: Array, v: Array, tau: Array) -> Array:
+        return np.array(pin.aba(self._arm.model, self._data, q, v, tau))
 
-def brake_torque(dynamics: InverseDynamics, v: Array, duration: float, period: float) -> Array:
-    """Return the torque (nv,) of the straight brake with a time to go.
-
-    Args:
-        dynamics: updated at the state.
-        v: velocity (nv,) [rad/s or m/s].
-        duration: time to go [s]; if infinite the brake is as hard as the limits allow.
-        period: time that the torque is held [s].
-    """
-    longest = max(duration, period) if np.isfinite(duration) else period
-    return dynamics.torque(-v / longest, np.zeros_like(v))
+    def _torque(self, q: Array, v: Array, a: Array) -> Array:
+        limit = self._arm.limits.effort
+        tau = pin.rnea(self._arm.model, self._data, q, v, a)
+        return np.asarray(np.clip(tau, -limit, limit))

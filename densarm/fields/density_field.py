@@ -7,13 +7,19 @@ from densarm.clearance import Clearance
 from densarm.fields.guided_density import GuidedDensity
 from densarm.fields.speed_law import SpeedLaw
 
+_NEAR = 1e-3  # [rad], below which a sub-goal's pull fades
+
 
 class DensityField:
     r"""The gradient of the guided density, no faster than the speed law allows.
 
     .. math::
 
-        k(q) = \lambda \min\{1, s / \|\lambda G^{-1} \nabla\rho\|\} \, G^{-1} \nabla\rho(q)
+        k(q) = \min\{1, s / \|p\|\} \, p, \qquad
+        p = \lambda \frac{\ell}{\|q \ominus q_{sub}\|} \, G^{-1} \nabla\rho(q)
+
+    The sub-goal q_sub pulls as from the end of the way ℓ that is left to the goal: else the speed
+    would jump whenever the next sub-goal comes in sight. Towards the goal itself the factor is one.
 
     Args:
         guided: the density and its sub-goals; evaluating the field moves along them.
@@ -49,7 +55,9 @@ class DensityField:
         if guided.is_critical():
             return np.zeros_like(self._gradient)
         guided.write_gradient(q, self._gradient)
-        velocity = self._rate * self._gradient
+        to_sub_goal, beyond = guided.way_left(q)
+        pull = 1.0 + beyond / max(to_sub_goal, _NEAR)
+        velocity = self._rate * pull * self._gradient
         if metric is not None:
             velocity = np.asarray(np.linalg.solve(metric, velocity), dtype=np.float64)
-        return self.speed_law.limit(q, velocity, self.clearance.distance, guided.way_left(q))
+        return self.speed_law.limit(q, velocity, self.clearance.distance, to_sub_goal + beyond)

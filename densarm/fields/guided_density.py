@@ -8,9 +8,9 @@ from densarm.density import (
     ClearanceSet,
     DensityParameters,
     Gauge,
+    GoalDistance,
     JointLimitSet,
     NavigationDensity,
-    TorusDistance,
 )
 from densarm.fields.stall import find_stall
 from densarm.fields.sub_goal_chain import SubGoalChain
@@ -27,8 +27,7 @@ class GuidedDensity:
         chain: the sub-goals.
         margin: safety margin m of the unsafe sets [m].
         parameters: of the density.
-        kappa: of the goal distance.
-        weights: of the goal distance, one per joint (nv,) [rad⁻² or m⁻²]; None for ones.
+        goal_distance: V, whose goal is moved along the sub-goals.
 
     Source: [ZNV] Remark 1, which lets the goal distance adapt to the space.
     """
@@ -39,15 +38,14 @@ class GuidedDensity:
         chain: SubGoalChain,
         margin: float,
         parameters: DensityParameters,
-        kappa: float,
-        weights: Array | None = None,
+        goal_distance: GoalDistance,
     ) -> None:
         arm = clearance.arm
         self.chain = chain
         self.clearance = clearance
         self._log_gradient = np.zeros(arm.nv)
         self._clearance_set = ClearanceSet(clearance, margin, chain.sensing_distance[1])
-        self.goal_distance = TorusDistance(arm, chain.q[1], weights, kappa)
+        self.goal_distance = goal_distance
         self.density = NavigationDensity(
             [self._clearance_set, JointLimitSet(arm, chain.joint_sensing_distance)],
             self.goal_distance,
@@ -95,10 +93,10 @@ class GuidedDensity:
         """Return whether the last update was at a critical point of ρ, the sub-goal included."""
         return not self.slope() > CRITICAL_SLOPE
 
-    def way_left(self, q: Array) -> float:
-        """Return the length of the way from q (nq,) by the sub-goals to the goal [rad]."""
+    def way_left(self, q: Array) -> tuple[float, float]:
+        """Return the lengths from q (nq,) to the sub-goal, and from there to the goal [rad]."""
         to_sub_goal = float(np.linalg.norm(self.goal_distance.error(q)))
-        return to_sub_goal + float(self.chain.remaining[self.chain.current])
+        return to_sub_goal, float(self.chain.remaining[self.chain.current])
 
     def describe_stall(self, q: Array) -> str:
         """Return, as a phrase, why the density leads nowhere from q (nq,), and what blocks it."""

@@ -92,7 +92,7 @@ class SpeedLaw:
             distance: signed distances of all pairs (K,) [m].
             way_left: length ℓ of the way to the goal [rad].
         """
-        norm = float(np.sqrt(velocity @ velocity))
+        norm = float(np.hypot.reduce(velocity))  # of entries as large as 1e200
         if norm == 0.0:
             return velocity
         return velocity * min(1.0, self.speed(q, velocity / norm, distance, way_left) / norm)

@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 
 from densarm.arm import load_arm
 from densarm.clearance import Clearance
+from densarm.control.gains import Gains
 from densarm.control.inverse_dynamics import InverseDynamics
 from densarm.control.stopping_guard import StoppingGuard
 from densarm.fields import SpeedLaw, SpeedParameters
@@ -28,7 +29,7 @@ DT = 0.002  # [s]
 def test_no_contact_whatever_torque_is_asked_for(seed):
     rng = np.random.default_rng(seed)
     law = SpeedLaw(BOUND, SpeedParameters())
-    guard = StoppingGuard(ARM, law, DT)
+    guard = StoppingGuard(ARM, law, Gains(), DT)
     dynamics = InverseDynamics(ARM, HELD_SHARE * ARM.limits.acceleration)
     q, v = ARM.postures["hanging"], np.zeros(2)
     pull = rng.uniform(-10.0, 10.0, 2)
@@ -45,10 +46,25 @@ def test_no_contact_whatever_torque_is_asked_for(seed):
         q = pin.integrate(ARM.model, q, DT * v)
 
 
+def test_acceleration_changes_by_its_limit_within_a_fortieth_of_a_second_at_most():
+    guard = StoppingGuard(ARM, SpeedLaw(BOUND, SpeedParameters()), Gains(), DT)
+    dynamics = InverseDynamics(ARM, ARM.limits.acceleration)
+    q, v, last = ARM.postures["hanging"], np.zeros(2), np.zeros(2)
+    for k in range(60):
+        dynamics.update(q, v)
+        wanted = dynamics.torque(np.zeros(2), (-1) ** (k // 20) * ARM.limits.acceleration)
+        tau = guard.torque(dynamics, q, v, wanted, BOUND.clearance.distances(q))
+        a = pin.aba(ARM.model, ARM.data, q, v, tau).copy()
+        assert (np.abs(a - last) <= ARM.limits.acceleration * DT * 40 * (1 + 1e-6)).all()
+        v, last = v + DT * a, a
+        q = pin.integrate(ARM.model, q, DT * v)
+    assert np.abs(last).max() > 0.1
+
+
 def test_what_is_harmless_is_let_through():
-    guard = StoppingGuard(ARM, SpeedLaw(BOUND, SpeedParameters()), DT)
+    guard = StoppingGuard(ARM, SpeedLaw(BOUND, SpeedParameters()), Gains(), DT)
     dynamics = InverseDynamics(ARM, ARM.limits.acceleration)
     q, v = ARM.postures["hanging"], np.zeros(2)
     dynamics.update(q, v)
-    wanted = dynamics.torque(v, np.array([1.0, 0.0]))
+    wanted = dynamics.torque(v, np.array([0.5, 0.0]))
     assert guard.torque(dynamics, q, v, wanted, BOUND.clearance.distances(q)) is wanted

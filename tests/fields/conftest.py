@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 
 from densarm.clearance import Clearance
-from densarm.density import DensityParameters
+from densarm.density import DensityParameters, TorusDistance
 from densarm.fields import GuidedDensity, SensingParameters, SubGoalChain
 from densarm.guides import DirectGuide, PathGuide
 from densarm.proof.swept_bound import SweptBound
@@ -33,6 +33,7 @@ def make_guided(swing_up):
         path = guide.plan(scenario.start, scenario.goal, 0)
         chain = SubGoalChain(bound, path, SensingParameters())
         density = DensityParameters(**parameters)
-        return bound, GuidedDensity(bound.clearance, chain, margin, density, 1.0)
+        distance = TorusDistance(scenario.arm, scenario.goal)
+        return bound, GuidedDensity(bound.clearance, chain, margin, density, distance)
 
     return make

@@ -28,7 +28,19 @@ def test_direction_is_the_gradient_and_speed_within_the_law(parts, angles):
     assert k @ gradient == pytest.approx(norm * np.linalg.norm(gradient))
     if norm > 0.0:
         distance = bound.clearance.distances(q)
-        assert norm <= law.speed(q, k / norm, distance, guided.way_left(q)) * (1 + 1e-9)
+        assert norm <= law.speed(q, k / norm, distance, sum(guided.way_left(q))) * (1 + 1e-9)
+
+
+def test_no_jump_where_the_next_sub_goal_comes_in_sight(make_guided):
+    bound, guided = make_guided()
+    field = DensityField(guided, SpeedLaw(bound, SpeedParameters()), rate=10.0)
+    q, speeds = guided.chain.q[0], []
+    for _ in range(600):
+        k = field.update(q)
+        speeds.append(np.linalg.norm(k))
+        q = bound.arm.integrate(q, 0.002 * k)
+    assert guided.chain.current > 20
+    assert np.abs(np.diff(speeds)).max() < 0.1 * max(speeds)
 
 
 def test_near_the_goal_it_is_linear(parts):
