@@ -230,7 +230,8 @@ def _run(
         clearance=smallest[:last],
         outcome=outcome,
         detail=detail,
-        return _drive(scenario, clearance, plan, chosen)
+        tracking_error=_tracking_error(scenario, drive, recording),
+        replanned_at=drive.replanned_at(),
     )
 
 

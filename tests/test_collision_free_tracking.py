@@ -6,7 +6,9 @@ not be the density that keeps the arm off them.
 
 from dataclasses import replace
 from functools import cache
+from itertools import product
 
+import numpy as np
 import pytest
 
 from densarm.closed_loop import simulate
@@ -19,15 +21,9 @@ TRACKING_ERROR = 0.005  # [rad]
 
 # The feedback at full rate is the one of the scenario files; slower rates are as certified and
 # simulate faster.
-DIVISOR = {ControlForm.TRACKING: 1, ControlForm.REGULATION: 5, ControlForm.PLAIN: 2}
-
-# Under the plain law Panda takes minutes of simulated time.
-CASES = [
-    (name, form)
-    for name in SCENARIOS
-    for form in ControlForm
-    if form != ControlForm.PLAIN or name == "swing_up"
-]
+DIVISOR = {ControlForm.TRACKING: 1, ControlForm.REGULATION: 5, ControlForm.PLAIN: 5}
+CASES = list(product(SCENARIOS, ControlForm))
+JERK_TIME = 0.025  # [s], 1 / K_v
 
 
 def configured(name, form):
@@ -49,6 +45,19 @@ def test_reaches_and_is_certified(name, form):
     run = run_of(name, form)
     assert run.outcome == Outcome.REACHED, run.detail
     assert [check for check in run.verify().checks if not check.holds] == []
+
+
+@pytest.mark.parametrize(
+    ("name", "form"), [case for case in CASES if case[1] != ControlForm.TRACKING]
+)
+def test_regulation_neither_jolts_nor_chatters(name, form):
+    run = run_of(name, form)
+    dt, limit = run.scenario.simulation.dt, run.scenario.arm.limits.acceleration
+    a = np.diff(run.v, axis=0) / dt / limit
+    step = run.scenario.simulation.control_period / JERK_TIME
+    assert np.abs(np.diff(a, axis=0)).max() < step + 0.05
+    changes = sum((np.diff(np.sign(x[np.abs(x) > 0.01])) != 0).sum() for x in a.T)
+    assert changes / run.time[-1] < 20.0
 
 
 @pytest.mark.parametrize("name", SCENARIOS)

@@ -35,6 +35,15 @@ class Controller(Protocol):
         ...
 
 
+def tracking_error(controller: Controller) -> float:
+    """Return the attribute `tracking_error` of a controller that has one, else zero.
+
+    It is how far the joint that is farthest from the reference was from it at the last call
+    [rad or m].
+    """
+    return float(getattr(controller, "tracking_error", 0.0))
+
+
 def checked_state(arm: Arm, q: ArrayLike, v: ArrayLike) -> tuple[Array, Array]:
     """Return q (nq,) and v (nv,) as float arrays; errors as `Controller.torque`."""
     q, v = np.ascontiguousarray(q, _FLOAT), np.ascontiguousarray(v, _FLOAT)

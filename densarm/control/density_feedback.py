@@ -49,4 +49,5 @@ class DensityFeedback:
         metric = self._metric * self._dynamics.mass_matrix()
         attract = self._gain * self._field.update(q, metric)
         wanted = self._dynamics.torque(-self._gain * v, attract)
-        return self._guard.torque(self._dynamics, q, v, wanted, self._field.clearance.distance)
+        distance = self._field.clearance.distance
+        return self._guard.torque(t, self._dynamics, q, v, wanted, distance)

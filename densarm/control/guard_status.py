@@ -19,8 +19,12 @@ class GuardWord(StrEnum):
     """Too much time passed between two calls."""
     CLOCK = "clock"
     """The time was not a finite number, or ran backwards."""
+    OFF_COURSE = "off_course"
+    """The arm is too far from where the guarded controller wants it to be."""
     NO_TORQUE = "no_torque"
     """The guarded controller failed, or gave a torque that is not finite or beyond the limits."""
+    SCENE_CHANGED = "scene_changed"
+    """The caller told that the scene is not that of the plan."""
     STOPPED = "stopped"
     """The caller asked for it."""
 

@@ -22,11 +22,13 @@ class GuardTolerances:
     """Largest difference of its velocity [rad/s or m/s]."""
     memory: float = 0.025
     """Time in which the observed state forgets such a difference [s]."""
+    tracking: float = 0.02
+    """Largest distance of a joint from the controller's reference, if it has one [rad or m]."""
     gap: float = 0.005
     """Longest time between two calls [s]; at least one and a half periods."""
     delay: float = 0.05
     """Time for which a state that came unexplained must agree with itself to be believed [s]."""
 
     def __post_init__(self) -> None:
-        for name in ("position", "velocity", "memory", "gap", "delay"):
+        for name in ("position", "velocity", "memory", "tracking", "gap", "delay"):
             positive(name, getattr(self, name))

@@ -9,7 +9,8 @@ from densarm.arm import Arm
 from densarm.arrays import Array
 from densarm.compiled import compiled
 from densarm.control.brake_and_hold import BrakeAndHold
-from densarm.control.controller import Controller, checked_state
+from densarm.control.call_clock import CallClock
+from densarm.control.controller import Controller, checked_state, tracking_error
 from densarm.control.gains import Gains
 from densarm.control.guard_status import GuardStatus, GuardWord
 from densarm.control.guard_tolerances import GuardTolerances
@@ -33,11 +34,12 @@ class GuardedController:
     """Passes on another controller's torque while all is well, and else stops the arm.
 
     All is well while the state is one, the dynamics explain how it came from the last one under
-    the torque between (see `StateObserver`), calls come in time, and the controller gives a finite
-    torque within the limits. Else the arm brakes along a straight line and holds still, until
-    `resume` is called: a controller that follows a reference in time would otherwise chase what
-    went on without it. `torque` never raises, and whatever it is given its result is finite and
-    within the torque limits. Without a fault it is the guarded controller's, bit for bit.
+    the torque between (see `StateObserver`), calls come in time, the arm keeps to the controller's
+    reference if it has one (`tracking_error`), and the controller gives a finite torque within the
+    limits. Else the arm brakes along a straight line and holds still, until `resume` is called: a
+    controller that follows a reference in time would otherwise chase what went on without it.
+    `torque` never raises, and whatever it is given its result is finite and within the torque
+    limits. Without a fault it is the guarded controller's, bit for bit.
 
     What it rests on. A measured state that does not agree is left out, and the arm is braked where
     the dynamics say that it is; one that then agrees with itself for the time `delay` is believed.
@@ -45,9 +47,9 @@ class GuardedController:
     the observed rest. That is no feedback: what the model does not know (payload, friction, a
     push) moves the arm unseen, and an arm held upright falls in the end. Close mechanical brakes
     then. Before the first state there is nothing to hold by, and the torque is zero. A state that
-    stays the same while the arm rests, that drifts slower than `GuardTolerances` allow, or a wrong
-    scene, cannot be noticed from here: who watches these calls `stop`. Between two calls nothing
-    can be done: a torque is held until the next one comes.
+    stays the same while the arm rests, that drifts slower than `GuardTolerances` allow, or another
+    scene cannot be noticed from here: who watches these calls `stop` or `scene_changed`. Between
+    two calls nothing can be done: a torque is held until the next one comes.
 
     Args:
         arm: the arm, as the plant is.
@@ -81,11 +83,10 @@ class GuardedController:
         self._agreed_for: float | None = None  # the candidate, if there is one
         self._status = GuardStatus()
         self._tau = np.zeros(arm.nv)
-        self._time: float | None = None
-        self._longest_gap = max(self._tolerances.gap, 1.5 * period)
+        self._clock = CallClock(period, max(self._tolerances.gap, 1.5 * period))
         self._last_q = np.full(arm.nq, np.nan)  # as measured
         self._knows_state = self._trusts_state = False
-        self._brakes_anew = self._has_rested = False
+        self._brakes_anew = self._has_rested = self._needs_plan = False
         self._state = self._observer.q, self._observer.v
 
     @property
@@ -107,16 +108,28 @@ class GuardedController:
         """Brake from the next call of `torque` on, and hold still.
 
         Args:
-            why: for the status, e.g. how the scene has changed.
+            why: for the status.
         """
         self._stop(GuardWord.STOPPED, why)
+
+    def scene_changed(self, how: str = "The scene has changed.") -> None:
+        """Brake from the next call of `torque` on, hold still, and resume with a new plan only.
+
+        The brake is a straight line, clear in the scene that the plan was made for.
+
+        Args:
+            how: for the status, e.g. which obstacle came or moved.
+        """
+        self._needs_plan = True
+        self._stop(GuardWord.SCENE_CHANGED, how)
 
     def resume(self, controller: Controller | None = None) -> bool:
         """Let a controller act again, if the arm rests and the last state was believed.
 
         Args:
             controller: acts from now on, e.g. along a new plan; None for the one before, which
-                fits a law without a reference in time. The next call may have any time.
+                fits a law without a reference in time, in the scene that it was made for. The
+                next call may have any time.
 
         Returns:
             Whether it acts.
@@ -124,15 +137,20 @@ class GuardedController:
         acts = self._status.word == GuardWord.ACTING
         if not acts and not (self.is_at_rest and self._trusts_state):
             return False
+        if self._needs_plan and controller is None:
+            return False
+        self._needs_plan = False
         self._controller = controller or self._controller
         self._status = GuardStatus()
         self._has_rested = False
-        self._time = None
+        self._clock.restart()
         return True
 
     def torque(self, t: float, q: ArrayLike, v: ArrayLike) -> Array:
         """Act as `Controller.torque`, but never raise: see `status`."""
-        dt = self._elapsed(t)
+        dt, fault = self._clock.elapsed(t)
+        if fault:
+            self._stop(fault.word, fault.sentence)
         measured = self._measured(t, q, v)
         self._observe(t, measured, dt)
         acts = self._status.word == GuardWord.ACTING and measured is not None
@@ -144,26 +162,6 @@ class GuardedController:
         if self._status.word == GuardWord.ACTING:
             self._status = GuardStatus(word, sentence)
             self._brakes_anew = True
-
-    def _elapsed(self, t: float) -> float:
-        """Return the time since the last call [s], as far as the clock can be believed."""
-        try:
-            now = float(t)
-        except (TypeError, ValueError, OverflowError):
-            now = math.nan
-        last, dt = self._time, self._period
-        self._time = now
-        if not math.isfinite(now):
-            self._time = None if last is None else last + dt
-            self._stop(GuardWord.CLOCK, f"The time {t!r} is not a finite number.")
-        elif last is not None and now < last:
-            self._stop(GuardWord.CLOCK, f"The time ran back from {last:.6g} s to {now:.6g} s.")
-        elif last is not None:
-            dt = now - last
-            if dt > self._longest_gap:
-                what = f"The call at t = {now:.6g} s came {dt:.3g} s after the last one"
-                self._stop(GuardWord.LATE, f"{what}, more than {self._longest_gap:.3g} s.")
-        return dt
 
     def _measured(self, t: float, q: ArrayLike, v: ArrayLike) -> Measured | None:
         """Return q (nq,) and v (nv,), or None if they are no state."""
@@ -227,15 +225,20 @@ class GuardedController:
         """Take the controller's torque over if it may be applied."""
         try:
             tau = np.asarray(self._controller.torque(t, q, v), dtype=np.float64)
+            off = tracking_error(self._controller)
         except Exception as error:  # noqa: BLE001  # whatever fails, the arm must be stopped
-            why = f"At t = {t:.6g} s the controller failed: {_one_line(error)}."
+            why = f"At t = {t} s the controller failed: {_one_line(error)}."
             self._stop(GuardWord.NO_TORQUE, why)
+            return False
+        if not off <= self._tolerances.tracking:
+            why = f"off the controller's reference by {off:.3g} rad or m"
+            self._stop(GuardWord.OFF_COURSE, f"At t = {t} s the arm is {why}.")
             return False
         limit = self._arm.limits.effort
         if tau.shape == limit.shape and _takes(tau, limit, self._tau):
             return True
         why = f"{_one_line(tau)}, and the limits are {_one_line(limit)}"
-        self._stop(GuardWord.NO_TORQUE, f"At t = {t:.6g} s the controller gave {why}.")
+        self._stop(GuardWord.NO_TORQUE, f"At t = {t} s the controller gave {why}.")
         return False
 
     def _brake_or_hold(self, dt: float) -> None:

@@ -5,7 +5,7 @@ from numpy.typing import ArrayLike
 from densarm.arm import Arm
 from densarm.arrays import Array
 from densarm.control.brake_and_hold import BrakeAndHold
-from densarm.control.controller import Controller, checked_state
+from densarm.control.controller import Controller, checked_state, tracking_error
 from densarm.control.gains import Gains
 
 
@@ -32,6 +32,11 @@ class StoppableController:
     def is_stopping(self) -> bool:
         """Whether `stop` was called."""
         return self._stopping
+
+    @property
+    def tracking_error(self) -> float:
+        """That of the other controller, if it tracks [rad or m]; zero once stopped."""
+        return 0.0 if self._stopping else tracking_error(self._controller)
 
     def stop(self) -> None:
         """Brake from the next call of `torque` on, and then hold still."""

@@ -35,27 +35,36 @@ class StoppingGuard:
         self._jerk = JerkLimit(arm.limits.acceleration, 1.0 / gains.velocity, period)
 
     def torque(
-        self, dynamics: InverseDynamics, q: Array, v: Array, wanted: Array, distance: Array
+        self,
+        t: float,
+        dynamics: InverseDynamics,
+        q: Array,
+        v: Array,
+        wanted: Array,
+        distance: Array,
     ) -> Array:
         """Return the wanted torque (nv,) [N·m or N] as far as the jerk allows, or the brake's.
 
         Args:
+            t: time since the motion began [s].
             dynamics: updated at q (nq,) and v (nv,).
             q: configuration (nq,).
             v: velocity (nv,) [rad/s or m/s].
             wanted: torque that is asked for (nv,) [N·m or N].
             distance: signed distances of all pairs at q (K,) [m].
         """
-        a = self._acceleration(q, v, wanted)
-        limited = self._jerk.limited(a)
-        tau = wanted if limited is a else self._torque(q, v, limited)
-        v_next = v + self._period * limited
+        a, tau = self._acceleration(q, v, wanted), wanted
+        limited = self._jerk.limited(t, a)
+        if limited is not a:
+            tau = self._torque(q, v, limited)
+            a = self._acceleration(q, v, tau)
+        v_next = v + self._period * a
         motion = self._period * np.maximum(np.abs(v), np.abs(v_next))
         q_next = self._arm.integrate(q, self._period * v_next)
         if not self._speed_law.can_stop(q_next, v_next, distance, motion):
             tau = dynamics.brake_torque(v, self._brake.duration(q, v), self._period)
-            limited = self._acceleration(q, v, tau)
-        self._jerk.last = limited
+            a = self._acceleration(q, v, tau)
+        self._jerk.last = a
         return tau
 
     def _acceleration(self, q: Array, v: Array, tau: Array) -> Array:

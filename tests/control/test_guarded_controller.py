@@ -57,7 +57,7 @@ class Loop:
         self.guarded = GuardedController(self.arm, self.inner, DT)
         self.data = self.arm.model.createData()
         self.k, self.q, self.v = 0, self.scenario.start, np.zeros(2)
-        self.tau = np.zeros(2)
+        self.tau, self.push = np.zeros(2), np.zeros(2)
 
     def run(self, time, seen=lambda q, v: (q, v), t=lambda t: t):
         """Go on for a time, the controller seeing what it is made to see."""
@@ -69,7 +69,7 @@ class Loop:
 
     def pass_time(self, time):
         for _ in range(round(time / DT)):
-            a = pin.aba(self.arm.model, self.data, self.q, self.v, self.tau)
+            a = pin.aba(self.arm.model, self.data, self.q, self.v, self.tau) + self.push
             self.v = self.v + DT * a
             self.q = pin.integrate(self.arm.model, self.q, DT * self.v)
             self.k += 1
@@ -213,6 +213,33 @@ def test_a_controller_that_fails_stops_the_arm(setting, tau):
     assert loop.guarded.is_at_rest
 
 
+def test_an_arm_that_strays_from_its_reference_is_stopped(setting):
+    loop = Loop(setting)
+    loop.guarded = GuardedController(loop.arm, loop.inner, DT, GuardTolerances(tracking=0.003))
+    loop.push = np.array([3.0, 0.0])  # [rad/s²], which the observer takes for normal
+    loop.run(0.8)
+    assert loop.guarded.status.word == GuardWord.OFF_COURSE
+    assert "reference" in loop.guarded.status.sentence
+    loop.push = np.zeros(2)
+    loop.run(0.8)
+    assert loop.guarded.is_at_rest
+    assert loop.guarded.trusts_state
+
+
+def test_another_scene_needs_another_plan(setting):
+    loop = Loop(setting).run(0.6)
+    loop.guarded.scene_changed("A box has come.")
+    loop.run(0.8)
+    assert loop.guarded.status.word == GuardWord.SCENE_CHANGED
+    assert loop.guarded.status.sentence == "A box has come."
+    assert loop.guarded.is_at_rest
+    assert not loop.guarded.resume()
+    assert loop.guarded.resume(Constant(np.zeros(2)))
+    loop.guarded.stop()
+    loop.run(0.8)
+    assert loop.guarded.resume()
+
+
 def test_stops_when_asked_and_resumes_when_asked(setting):
     loop = Loop(setting).run(0.6)
     loop.guarded.stop("A box has come.")
@@ -249,7 +276,7 @@ def test_before_the_first_state_there_is_no_torque(setting):
     np.testing.assert_array_equal(guarded.torque(0.0, np.full(4, np.nan), np.zeros(2)), 0.0)
 
 
-@pytest.mark.parametrize("key", ["position", "velocity", "memory", "gap", "delay"])
+@pytest.mark.parametrize("key", ["position", "velocity", "memory", "tracking", "gap", "delay"])
 @pytest.mark.parametrize("value", [0.0, np.nan, "long"])
 def test_tolerances_are_checked(key, value):
     with pytest.raises(InvalidValueError, match=f"^{key} = "):

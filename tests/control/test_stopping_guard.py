@@ -40,7 +40,7 @@ def test_no_contact_whatever_torque_is_asked_for(seed):
         assert (distance > 0.0).all()
         dynamics.update(q, v)
         wanted = dynamics.torque(-0.2 * v, pull)
-        tau = guard.torque(dynamics, q, v, wanted, distance)
+        tau = guard.torque(k * DT, dynamics, q, v, wanted, distance)
         assert (np.abs(tau) <= ARM.limits.effort).all()
         v = v + DT * pin.aba(ARM.model, ARM.data, q, v, tau)
         q = pin.integrate(ARM.model, q, DT * v)
@@ -53,12 +53,16 @@ def test_acceleration_changes_by_its_limit_within_a_fortieth_of_a_second_at_most
     for k in range(60):
         dynamics.update(q, v)
         wanted = dynamics.torque(np.zeros(2), (-1) ** (k // 20) * ARM.limits.acceleration)
-        tau = guard.torque(dynamics, q, v, wanted, BOUND.clearance.distances(q))
+        tau = guard.torque(k * DT, dynamics, q, v, wanted, BOUND.clearance.distances(q))
         a = pin.aba(ARM.model, ARM.data, q, v, tau).copy()
         assert (np.abs(a - last) <= ARM.limits.acceleration * DT * 40 * (1 + 1e-6)).all()
         v, last = v + DT * a, a
         q = pin.integrate(ARM.model, q, DT * v)
     assert np.abs(last).max() > 0.1
+    dynamics.update(q, v)
+    tau = guard.torque(1e3, dynamics, q, v, wanted, BOUND.clearance.distances(q))
+    a = pin.aba(ARM.model, ARM.data, q, v, tau)  # from zero again
+    assert (np.abs(a) <= ARM.limits.acceleration * DT * 40 * (1 + 1e-6)).all()
 
 
 def test_what_is_harmless_is_let_through():
@@ -67,4 +71,4 @@ def test_what_is_harmless_is_let_through():
     q, v = ARM.postures["hanging"], np.zeros(2)
     dynamics.update(q, v)
     wanted = dynamics.torque(v, np.array([0.5, 0.0]))
-    assert guard.torque(dynamics, q, v, wanted, BOUND.clearance.distances(q)) is wanted
+    assert guard.torque(0.0, dynamics, q, v, wanted, BOUND.clearance.distances(q)) is wanted
