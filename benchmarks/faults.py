@@ -10,7 +10,7 @@ guard if `StoppingCheck` proves the straight brake from the fault's sample clear
 import argparse
 import json
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import cycle, islice, product
 from pathlib import Path
 
@@ -139,14 +139,17 @@ class FailingController:
 class Course:
     """A scenario's run, in which faults are injected."""
 
-    def __init__(self, name, model_error):
-        self.scenario = scenario = densarm.load_scenario(name)
+    def __init__(self, name, form, model_error):
+        scenario = densarm.load_scenario(name)
+        scenario = replace(scenario, control=replace(scenario.control, form=form))
+        self.scenario = scenario
         self.clearance = densarm.Clearance(scenario.arm, scenario.scene)
         self.plan = densarm.plan_motion(scenario, self.clearance, scenario.control.guide)
         self.controller = densarm.make_controller(scenario, self.plan)
         self.run = densarm.simulate(scenario)
         if self.run.outcome != "reached":
             raise SystemExit(f"{name}: {self.run.outcome}")
+        self.sub_goals = self.plan.reference is None and self.followed()
         self.model = scenario.arm.model.copy()
         for inertia in self.model.inertias:
             inertia.mass *= 1.0 + model_error
@@ -154,6 +157,14 @@ class Course:
         bound = densarm.SweptBound(self.clearance, 0.0)
         check = StoppingCheck(bound, StraightBrake(scenario.arm))
         self.could_stop = check.check(self.run.q, self.run.v).holds
+
+    def followed(self):
+        """The sub-goal at each sample of the run."""
+        guided, followed = self.plan.guided, []
+        for q in self.run.q:
+            guided.update(q)
+            followed.append(guided.chain.current)
+        return followed
 
     def inject(self, kind, seed):
         """Return what came of one fault."""
@@ -166,6 +177,9 @@ class Course:
         guarded = GuardedController(arm, inner, dt)
         states = [(self.run.q[k], self.run.v[k]) for k in range(at - LEAD - GAP[1], at - LEAD + 1)]
         case = Case(fault.name, bool(self.could_stop[at]), for_good)
+        if self.sub_goals:  # one before, from which the controller moves on
+            self.plan.guided.restart()
+            self.plan.guided.chain.current = max(self.sub_goals[at - LEAD] - 1, 1)
         rest, tau = 0, np.zeros(arm.nv)
         for k in range(-LEAD, LONGEST):
             inner.fails = k >= 0 and fault.fails(k)
@@ -247,6 +261,7 @@ def arguments():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--faults", type=int, default=1000, metavar="N")
     parser.add_argument("--scenarios", nargs="+", default=SCENARIOS, help="names or TOML files")
+    parser.add_argument("--form", default="tracking", choices=list(densarm.ControlForm))
     parser.add_argument("--seed", type=int, default=0, help="of the first fault")
     parser.add_argument("--model-error", type=float, default=0.0, help="share of the masses")
     parser.add_argument("--json", metavar="FILE")
@@ -255,7 +270,9 @@ def arguments():
 
 def main():
     args = arguments()
-    courses = {Path(name).stem: Course(name, args.model_error) for name in args.scenarios}
+    courses = {
+        Path(name).stem: Course(name, args.form, args.model_error) for name in args.scenarios
+    }
     cases, began = {}, time.perf_counter()
     pairs = islice(cycle(product(courses, KINDS)), args.faults)
     for seed, (name, kind) in enumerate(pairs, start=args.seed):
