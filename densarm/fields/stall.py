@@ -7,7 +7,7 @@ import numpy as np
 
 from densarm.arm import Arm
 from densarm.arrays import Array
-from densarm.density import ClearanceSet, Gauge, NavigationDensity, TorusDistance
+from densarm.density import ClearanceSet, Gauge, GoalDistance, NavigationDensity
 from densarm.density.inverse_bump import log_inverse_bump
 from densarm.fields.critical_point import CriticalKind, CriticalPoint, find_critical_point
 
@@ -51,7 +51,7 @@ _PHRASES = {
 
 
 def find_stall(
-    density: NavigationDensity[TorusDistance], clearance_set: ClearanceSet, limits: Array, q: Array
+    density: NavigationDensity[GoalDistance], clearance_set: ClearanceSet, limits: Array, q: Array
 ) -> Stall:
     """Return why a density leads nowhere from a configuration.
 
@@ -84,7 +84,7 @@ def find_stall(
 class _Around:
     """ln ρ in the coordinates x of q ⊕ x."""
 
-    def __init__(self, density: NavigationDensity[TorusDistance], arm: Arm, q: Array) -> None:
+    def __init__(self, density: NavigationDensity[GoalDistance], arm: Arm, q: Array) -> None:
         self._density, self._arm, self._q = density, arm, q
 
     def gradient(self, x: Array, gauge: Gauge) -> Array:
@@ -101,14 +101,14 @@ def _is_here(point: CriticalPoint, pull: float) -> bool:
     return bool(near and point.slope <= _FLAT * max(1.0, pull))
 
 
-def _pull(density: NavigationDensity[TorusDistance]) -> Array:
+def _pull(density: NavigationDensity[GoalDistance]) -> Array:
     """Return -α ∇V/V (nv,) at the last update."""
     distance = max(density.goal_distance_value, 1e-300)
     return np.asarray(-density.parameters.alpha * density.goal_distance_gradient / distance)
 
 
 def _opposing(
-    density: NavigationDensity[TorusDistance],
+    density: NavigationDensity[GoalDistance],
     clearance_set: ClearanceSet,
     limits: Array,
     q: Array,

@@ -114,7 +114,7 @@ def _by_density(
     if isinstance(plan, NoPath):
         return plan
     controller = make_controller(scenario, plan)
-    return Drive(controller, plan.describe_stall, plan.reference, plan.guide_time)
+    return Drive(controller, plan.describe_stall, plan.reference, plan_time=plan.guide_time)
 
 
 def _shared(scenario: Scenario, clearance: Clearance) -> tuple[Barriers, GoalDistance, SpeedLaw]:
