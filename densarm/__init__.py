@@ -29,6 +29,8 @@ if TYPE_CHECKING:
         DensitySample,
         NavigationDensity,
     )
+    from densarm.density.near_clearance_set import NearClearanceSet
+    from densarm.density.near_pairs import NearPairs
     from densarm.density.unsafe_set import ClearanceSet, ImplicitSet, JointLimitSet
     from densarm.errors import (
         DensarmError,
@@ -116,6 +118,8 @@ __all__ = [
     "MotionPlan",
     "MotionProblem",
     "NavigationDensity",
+    "NearClearanceSet",
+    "NearPairs",
     "NoPath",
     "Outcome",
     "PathGuide",
@@ -175,6 +179,8 @@ _NAMES = {
     "density.goal_distance": ("EuclideanDistance", "ProductDistance", "TorusDistance"),
     "density.navigation_density": ("DensityParameters", "DensitySample", "NavigationDensity"),
     "density.unsafe_set": ("ClearanceSet", "ImplicitSet", "JointLimitSet"),
+    "density.near_clearance_set": ("NearClearanceSet",),
+    "density.near_pairs": ("NearPairs",),
     "errors": (
         "DensarmError",
         "FileContentError",

@@ -1,5 +1,6 @@
 """Clearance: signed distances of all geometry pairs and their joint-space gradients."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -8,10 +9,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from densarm.arm import Arm
 from densarm.arrays import Array
+from densarm.changing_obstacles import ChangingObstacles
 from densarm.compiled import compiled
 from densarm.distance_view import DistanceView
-from densarm.errors import InvalidValueError
-from densarm.obstacles import geometry_objects
+from densarm.errors import InvalidValueError, SceneChangedError
+from densarm.obstacles import Obstacle, geometry_objects
 from densarm.scene import Scene
 
 COAL_TOLERANCE = 1e-10
@@ -45,19 +47,25 @@ class Clearance:
 
     J the world-frame joint Jacobian and S_b the joints that move body b.
 
+    Obstacles can be moved, added and removed between queries, at a cost that does not grow with
+    the scene. Room for those to come is made beforehand: a spare obstacle stands for any of its
+    shape and size, a spare sphere or capsule for those of any size. What finds no spare one needs
+    a new clearance, made apart from the control loop: that takes milliseconds.
+
     Args:
         arm: the arm; its collision model holds the self-collision pairs.
         scene: the obstacles. Shapes that no joint moves are not paired with them.
+        spare: obstacles that are not there yet, at infinite distance until they are added.
 
     Raises:
-        InvalidValueError: an obstacle is named like a shape of the arm, or the scene attaches
-            bodies that the arm does not hold.
+        InvalidValueError: an obstacle is named like a shape of the arm or another obstacle, or
+            the scene attaches bodies that the arm does not hold.
     """
 
-    def __init__(self, arm: Arm, scene: Scene) -> None:
+    def __init__(self, arm: Arm, scene: Scene, spare: Iterable[Obstacle] = ()) -> None:
         self.arm = arm
-        self.scene = scene
-        self.geometry_model = _geometry_model(arm, scene)
+        reserve = Scene([*scene, *spare], scene.attachments)
+        self.geometry_model = _geometry_model(arm, reserve)
         self.geometry_data = self.geometry_model.createData()
         self._data = arm.model.createData()
         # A view that follows the data; Pinocchio drops the second axis of a single column.
@@ -68,9 +76,10 @@ class Clearance:
             [(pair.first, pair.second) for pair in self.geometry_model.collisionPairs],
             dtype=np.int64,
         ).reshape(-1, 2)
-        names = [item.name for item in self.geometry_model.geometryObjects]
-        self.pairs = tuple((names[i], names[j]) for i, j in self.pair_shapes)
-        self.n_pairs = len(self.pairs)
+        self.n_pairs = len(self.pair_shapes)
+        self._obstacles = ChangingObstacles(self.geometry_model, self.pair_shapes, reserve)
+        for obstacle in reserve.obstacles[len(scene) :]:
+            self._obstacles.remove(obstacle.name)
         self.sign = self._joint_signs()
         """S_2 - S_1 (K, nv): how each joint moves body 2 of a pair against body 1."""
         self.distance: Array = np.zeros(self.n_pairs)
@@ -79,6 +88,86 @@ class Clearance:
         """Their gradients (K, nv); overwritten by the next `update`."""
         self._query(pin.neutral(arm.model))
         self._view = DistanceView(self.geometry_data)
+        self._is_spare = np.zeros(self.n_pairs, bool)
+        self._skip_spare_pairs()
+
+    @property
+    def scene(self) -> Scene:
+        """The obstacles as they are now."""
+        return self._obstacles.scene
+
+    @property
+    def pairs(self) -> tuple[tuple[str, str], ...]:
+        """Names of the two bodies of each pair; a spare obstacle goes by its last name."""
+        return self._obstacles.pairs
+
+    @property
+    def changes(self) -> NDArray[np.int64]:
+        """For each pair, the `version` that its obstacle is of, negative if it is spare (K,)."""
+        return self._obstacles.changes
+
+    @property
+    def version(self) -> int:
+        """Number of changes to the obstacles so far."""
+        return self._obstacles.version
+
+    def require_version(self, version: int) -> None:
+        """Refuse what was computed before a change to the obstacles.
+
+        Raises:
+            SceneChangedError: `version` is not the present one.
+        """
+        if version != self._obstacles.version:
+            raise SceneChangedError
+
+    def move_obstacle(
+        self, name: str, position: ArrayLike, orientation_xyzw: ArrayLike | None = None
+    ) -> None:
+        """Put an obstacle elsewhere.
+
+        Args:
+            name: of the obstacle.
+            position: origin of its frame (3,) [m].
+            orientation_xyzw: unit quaternion of its frame; None to leave it.
+
+        Raises:
+            UnknownNameError: no such obstacle.
+            InvalidValueError: no pose.
+        """
+        self._obstacles.move(name, position, orientation_xyzw)
+
+    def add_obstacle(self, obstacle: Obstacle) -> None:
+        """Put an obstacle in the place of a spare one.
+
+        Args:
+            obstacle: of the shape and size of a spare one, or a sphere or capsule of any size.
+
+        Raises:
+            InvalidValueError: its name is taken, or there is no spare one for it.
+        """
+        self._obstacles.add(obstacle)
+        self._skip_spare_pairs()
+
+    def remove_obstacle(self, name: str) -> None:
+        """Take an obstacle away; it is spare from then on.
+
+        Args:
+            name: of the obstacle.
+
+        Raises:
+            UnknownNameError: no such obstacle.
+        """
+        self._obstacles.remove(name)
+        self._skip_spare_pairs()
+
+    def _skip_spare_pairs(self) -> None:
+        is_spare = self.changes < 0
+        for k in np.flatnonzero(is_spare != self._is_spare).tolist():
+            if is_spare[k]:
+                self.geometry_data.deactivateCollisionPair(k)
+            else:
+                self.geometry_data.activateCollisionPair(k)
+        self._is_spare, self._has_spare = is_spare, bool(is_spare.any())
 
     def evaluate(self, q: ArrayLike) -> ClearanceSample:
         """Return distances and gradients at q.
@@ -103,6 +192,9 @@ class Clearance:
             _pair_gradients(
                 self._view.read(), self._jacobian, self.sign, self.distance, self.gradient
             )
+        if self._has_spare:
+            self.distance[self._is_spare] = np.inf
+            self.gradient[self._is_spare] = 0.0
 
     def distances(self, q: Array, pairs: NDArray[np.int64] | None = None) -> Array:
         """Return a new array of distances [m] at q (nq,), without gradients or checks.
@@ -113,6 +205,8 @@ class Clearance:
         """
         self._query(q, pairs)
         distance = self._view.read()[:, 0]
+        if self._has_spare:
+            distance = np.where(self._is_spare, np.inf, distance)
         return distance.copy() if pairs is None else distance[pairs]
 
     def _query(self, q: Array, pairs: NDArray[np.int64] | None = None) -> None:

@@ -43,6 +43,15 @@ class RobotDescriptionError(DensarmError):
     """A URDF or SRDF that cannot be used, with the reason."""
 
 
+class SceneChangedError(DensarmError):
+    """Something computed for obstacles that have since moved, come or gone."""
+
+    def __init__(self) -> None:
+        super().__init__(
+            "the obstacles have changed since this was computed: compute it anew from the clearance"
+        )
+
+
 class FileContentError(DensarmError):
     """A file that is not what its reader expects.
 

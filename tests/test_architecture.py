@@ -34,7 +34,7 @@ LAYERS = (
     ("scene_files",),
     ("arm",),
     ("holding_torque", "joint_torques", "rigid_body"),
-    ("distance_view", "clearance"),
+    ("distance_view", "changing_obstacles", "clearance"),
     ("proof", "clear_configurations"),
     ("density",),
     ("guides",),

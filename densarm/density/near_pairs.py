@@ -15,7 +15,8 @@ from densarm.density.joint_error import joint_error
 from densarm.distance_view import DistanceView
 from densarm.proof.swept_bound import SweptBound
 
-_ASLEEP, _AWAKE, _NEW = 0, 1, 2
+_ASLEEP, _AWAKE = 0, 1
+_NEVER = 0  # seen, of a pair that must be queried
 _STEPS = 8.0  # that a pair must be able to sleep: waking it costs as much as some queries
 _LONGEST_WAY = 1e4  # [rad or m], beyond which sums of small steps would round off too much
 
@@ -67,7 +68,8 @@ class NearPairs:
         """World-frame joint Jacobian (6, nv) at the last update."""
         self.sign = clearance.sign
         """S_2 - S_1 of `Clearance` (K, nv)."""
-        self._pair_states = np.full((2, n), _NEW)  # second row: workspace
+        # Rows: awake, the version of `Clearance.changes` that was queried, and a workspace.
+        self._pair_states = np.array([[_AWAKE], [_NEVER], [0]]).repeat(n, axis=1)
         self.state: NDArray[np.int64] = self._pair_states[0]
         """Nonzero where a pair is awake (K,)."""
         self._pair_numbers = np.ones((2, n))
@@ -88,6 +90,7 @@ class NearPairs:
             self._joint_numbers,
             self._pair_numbers,
             self._pair_states,
+            clearance.changes,
         )
 
     @property
@@ -99,9 +102,7 @@ class NearPairs:
 
     def wake_all(self) -> None:
         """Query every pair at the next update."""
-        for k in np.flatnonzero(self.state == _ASLEEP).tolist():
-            self._geometry_data.activateCollisionPair(k)
-        self.state[:] = _NEW
+        self._pair_states[1] = _NEVER
 
     def update(self, q: Array, margin: float) -> None:
         """Query the pairs that may be within reach at q (nq,), and some others.
@@ -112,7 +113,7 @@ class NearPairs:
         """
         geometry, data = self._geometry, self._geometry_data
         n_awake, n_changed = _wake(q, margin, *self._arrays)
-        for k in self._pair_states[1, :n_changed].tolist() if n_changed else ():
+        for k in self._pair_states[2, :n_changed].tolist() if n_changed else ():
             if k >= 0:
                 data.activateCollisionPair(k)
             else:
@@ -138,47 +139,66 @@ def _wake(
     joint_numbers: Array,
     pair_numbers: Array,
     pair_states: NDArray[np.int64],
+    changes: NDArray[np.int64],
 ) -> tuple[int, int]:
     """Decide which pairs are awake at q; return how many, and how many changed.
 
-    Into the second row of `pair_states` go the indices of pairs that wake, and the complements of
+    Into the last row of `pair_states` go the indices of pairs that wake, and the complements of
     those that fall asleep.
     """
-    way, last, low, high = joint_numbers[0], joint_numbers[1], joint_numbers[2], joint_numbers[3]
     sensing_distance, level = pair_numbers[0], pair_numbers[1]
-    state, changed = pair_states[0], pair_states[1]
-    nv = way.shape[0]
-    joint_error(q_last, q, idx_q, is_circle, last)
-    wakes_all = False
-    for j in range(nv):
-        last[j] = abs(last[j])
-        way[j] += last[j]
-        x, y = q[idx_q[j]], q_last[idx_q[j]]
-        wakes_all |= not (low[j] <= x <= high[j] and low[j] <= y <= high[j])
-        wakes_all |= not way[j] < _LONGEST_WAY
-    if wakes_all:
-        way[:] = 0.0
-    q_last[:] = q
+    state, seen, changed = pair_states[0], pair_states[1], pair_states[2]
+    wakes_all = not _go(q, q_last, idx_q, is_circle, joint_numbers)
     n_awake, n_changed = 0, 0
     for k in range(state.shape[0]):
-        gone = 0.0
-        for j in range(nv):
-            gone += lever[k, j] * way[j]
+        gone = _motion(lever[k], joint_numbers[0])
         reach = margin + sensing_distance[k] + 2.0 * DISTANCE_TOLERANCE
         before = state[k]
-        if before == _ASLEEP:
-            state[k] = _AWAKE if wakes_all or not level[k] - gone > reach else _ASLEEP
-        elif before == _NEW or wakes_all:
+        if changes[k] < 0:  # spare
+            state[k], level[k] = _ASLEEP, np.inf
+        elif changes[k] != seen[k] or wakes_all:
             state[k] = _AWAKE
+        elif before == _ASLEEP:
+            state[k] = _ASLEEP if level[k] - gone > reach else _AWAKE
         else:
-            step = 0.0
-            for j in range(nv):
-                step += lever[k, j] * last[j]
+            step = _motion(lever[k], joint_numbers[1])
             if rows[k, 0] - reach > (_STEPS + 1.0) * step:
                 state[k] = _ASLEEP
                 level[k] = rows[k, 0] + (gone - step)
+        seen[k] = changes[k]
         n_awake += state[k]
         if (before == _ASLEEP) != (state[k] == _ASLEEP):
             changed[n_changed] = ~k if state[k] == _ASLEEP else k
             n_changed += 1
     return n_awake, n_changed
+
+
+@compiled
+def _go(
+    q: Array,
+    q_last: Array,
+    idx_q: NDArray[np.int64],
+    is_circle: NDArray[np.bool_],
+    joint_numbers: Array,
+) -> bool:
+    """Add the last step to the way gone; return whether bounds hold that are older than it."""
+    way, step, low, high = joint_numbers[0], joint_numbers[1], joint_numbers[2], joint_numbers[3]
+    joint_error(q_last, q, idx_q, is_circle, step)
+    holds = True
+    for j in range(way.shape[0]):
+        step[j] = abs(step[j])
+        way[j] += step[j]
+        x, y = q[idx_q[j]], q_last[idx_q[j]]
+        holds &= low[j] <= x <= high[j] and low[j] <= y <= high[j] and way[j] < _LONGEST_WAY
+    if not holds:
+        way[:] = 0.0
+    q_last[:] = q
+    return holds
+
+
+@compiled
+def _motion(lever: Array, way: Array) -> float:
+    motion = 0.0
+    for j in range(way.shape[0]):
+        motion += lever[j] * way[j]
+    return motion

@@ -43,6 +43,7 @@ class GuidedDensity:
         arm = clearance.arm
         self.chain = chain
         self.clearance = clearance
+        self._version = clearance.version
         self._log_gradient = np.zeros(arm.nv)
         self._clearance_set = ClearanceSet(clearance, margin, chain.sensing_distance[1])
         self.goal_distance = goal_distance
@@ -59,7 +60,12 @@ class GuidedDensity:
         self._point_at_sub_goal()
 
     def update(self, q: Array) -> None:
-        """Move on to the farthest sub-goal in sight of q (nq,) and evaluate its density there."""
+        """Move on to the farthest sub-goal in sight of q (nq,) and evaluate its density there.
+
+        Raises:
+            SceneChangedError: obstacles have changed since the sub-goals were proved.
+        """
+        self.clearance.require_version(self._version)
         self.density.update(q)
         if self.chain.advance(q, self.clearance.distance):
             self._point_at_sub_goal()
