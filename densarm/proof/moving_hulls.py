@@ -1,6 +1,7 @@
 """MovingHulls: the bodies of an arm and its scene as rounded hulls, placed by compiled code."""
 
 import math
+from functools import lru_cache
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -48,7 +49,16 @@ class MovingHulls(NamedTuple):
 
 
 def moving_hulls(clearance: Clearance) -> tuple[MovingHulls, NDArray[np.int64]]:
-    """Return the pairs of a clearance, and for each one some corner of both hulls (K, 2)."""
+    """Return the pairs of a clearance, and for each one some corner of both hulls (K, 2).
+
+    What is returned is of the obstacles as they are now, and not to be written to.
+    """
+    return _moving_hulls(clearance, clearance.version)
+
+
+# A plan proves under several margins, each time with the same hulls.
+@lru_cache(maxsize=1)
+def _moving_hulls(clearance: Clearance, _: int) -> tuple[MovingHulls, NDArray[np.int64]]:
     shapes = list(clearance.geometry_model.geometryObjects)
     hulls = rounded_hulls([item.geometry for item in shapes])
     corners = [hulls.points[a:b] for a, b in pairwise(hulls.first)]

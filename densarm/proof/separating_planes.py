@@ -26,19 +26,24 @@ class SeparatingPlanes:
 
     Where neither this nor the distances at both ends prove a pair, the segment is halved.
 
+    Obstacles that are moved afterwards ask for a new object; questions to the old one raise
+    `SceneChangedError`.
+
     Args:
         bound: the pairs, the bound on their motion, and the margin to be kept.
     """
 
     def __init__(self, bound: SweptBound) -> None:
         self._arm = bound.arm
+        self._clearance = bound.clearance
+        self._version = bound.clearance.version
         self._lever = bound.lever
         self._kept = np.full(len(bound.lever), bound.margin + DISTANCE_TOLERANCE)
         bodies, some_corner = moving_hulls(bound.clearance)
         self._bodies = (*bodies, bound.shape_lever)
         self._corners = np.full((len(some_corner), 4, 2), -1)
         self._corners[:, 0] = some_corner
-        self._order = np.arange(len(some_corner))
+        self._order = np.flatnonzero(self._clearance.changes > 0)
 
     def configuration_is_clear(self, q: Array) -> bool:
         """Return whether every distance at q (nq,) is proved above the margin."""
@@ -65,6 +70,7 @@ class SeparatingPlanes:
         return self._is_clear(angles, step, self._kept + self._lever @ radius)
 
     def _is_clear(self, angles: Array, step: Array, kept: Array) -> bool:
+        self._clearance.require_version(self._version)
         state = self._corners, self._order
         return bool(_segment_is_clear(*self._bodies, *state, kept, angles, step))
 

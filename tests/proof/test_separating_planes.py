@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 from densarm.arm import load_arm
 from densarm.clearance import Clearance
+from densarm.errors import SceneChangedError
 from densarm.proof.separating_planes import SeparatingPlanes
 from densarm.proof.swept_bound import SweptBound
 from densarm.scene import Box, Capsule, Cylinder, HalfSpace, Scene, Sphere
@@ -75,3 +76,18 @@ def test_everything_is_clear_without_pairs():
     arm = load_arm("two_link")
     planes = SeparatingPlanes(SweptBound(Clearance(arm, Scene())))
     assert planes.segment_is_clear(arm.configuration([0.0, 0.0]), arm.configuration([3.0, 1.0]))
+
+
+def test_obstacles_that_change():
+    """What was proved before a change is no proof; a spare obstacle is in nobody's way."""
+    arm = load_arm("two_link")
+    ball = Sphere(name="ball", radius=0.02, position=[5.0, 0.0, 0.0])
+    spare = Sphere(name="spare", radius=0.02, position=[1.5, 0.0, 0.0])
+    bound = SweptBound(Clearance(arm, Scene([ball]), spare=[spare]))
+    start, goal = arm.configuration([0.0, 0.0]), arm.configuration([3.0, 0.0])
+    planes = SeparatingPlanes(bound)
+    assert planes.segment_is_clear(start, goal)
+    bound.clearance.move_obstacle("ball", [1.5, 0.0, 0.0])
+    with pytest.raises(SceneChangedError):
+        planes.segment_is_clear(start, goal)
+    assert not SeparatingPlanes(bound).segment_is_clear(start, goal)
