@@ -36,16 +36,19 @@ class ComputedTorque:
         self._gains = gains
         self._dynamics = InverseDynamics(arm, HELD_SHARE * arm.limits.acceleration)
         self._wanted = TorusDistance(arm, arm.configuration(reference.position[0]))
-        self.tracking_error = 0.0
+        self._error = np.zeros(arm.nv)
+
+    @property
+    def tracking_error(self) -> float:
         """Largest |e| of a joint at the last call [rad or m]."""
+        return float(np.abs(self._error).max())
 
     def torque(self, t: float, q: ArrayLike, v: ArrayLike) -> Array:
         """Act as `Controller.torque`."""
         q, v = checked_state(self._arm, q, v)
         point = self._reference.update(t, lead=0.5 * self._reference.period)
         self._wanted.set_goal_angles(point[0])
-        error = self._wanted.error(q)
-        self.tracking_error = float(np.abs(error).max())
+        self._error = self._wanted.error(q)
         self._dynamics.update(q, v)
         brake = point[2] - self._gains.velocity * (v - point[1])
-        return self._dynamics.torque(brake, -self._gains.position * error)
+        return self._dynamics.torque(brake, -self._gains.position * self._error)

@@ -69,18 +69,19 @@ class DensityTracking:
             *self._dynamics.terms,
             np.zeros((9, arm.nv)),
         )
+        self._seen = goal_distance.goal.copy()
         # Kernels are loaded, or compiled, here rather than in the first step of a control loop.
-        self.torque(0.0, goal_distance.goal.copy(), np.zeros(arm.nv))
+        self.torque(0.0, self._seen, np.zeros(arm.nv))
 
     @property
     def tracking_error(self) -> float:
         """Largest |e| of a joint at the last call [rad or m]."""
-        return float(np.abs(self._density.goal_distance.error(self._q)).max())
+        return float(np.abs(self._density.goal_distance.error(self._seen)).max())
 
     def torque(self, t: float, q: ArrayLike, v: ArrayLike) -> Array:
         """Act as `Controller.torque`."""
         q, v = checked_state(self._arm, q, v)
-        self._q = q
+        self._seen[:] = q
         density = self._density
         density.update_psi(q)
         self._dynamics.update(q, v)
