@@ -112,13 +112,13 @@ def main(arguments: list[str] | None = None) -> None:
         print_table(comparison)
         for bar in comparison["bars"]:
             met = "met" if bar["met"] else "missed"
-            print(f"  bar {bar['bar']:g} x, {bar['name']}: {bar['ratio']:.1f} x, {met}")
+            print(f"  bar {bar['bar']:g} x, {bar['name']}: {bar['ratio']:.1f} x, {met}", flush=True)
+        if options.json:
+            write_json(options.json, result)
     print("\nHow each was set up")
     for step in result["comparisons"][0]["steps"]:
         print(f"  {step['name']}: {step['set_up']}")
     print(UNEQUAL)
-    if options.json:
-        write_json(options.json, result)
     if options.figure:
         from control_steps.figure import draw
 

@@ -7,6 +7,7 @@ that row's alone. 10⁵ steps give the 99.9 % a hundred samples; 10⁶ show whet
 """
 
 import argparse
+from concurrent.futures import ProcessPoolExecutor
 from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
@@ -20,8 +21,8 @@ PAIRS = [8, 16, 32, 64, 128, 256, 512, 1024]
 
 
 def measure(shapes: str, pairs: int, steps: int) -> dict[str, Any]:
-    with get_context("spawn").Pool(1) as process:
-        timing = process.apply(time_step, ("panda", shapes, pairs, steps))
+    with ProcessPoolExecutor(1, get_context("spawn")) as process:
+        timing = process.submit(time_step, "panda", shapes, pairs, steps).result()
     return {"shapes": shapes, **timing.to_json()}
 
 

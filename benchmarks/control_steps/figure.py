@@ -37,8 +37,8 @@ def draw(comparison: dict[str, Any], file: Path) -> None:
         axes.set_xlim(right=axes.get_xlim()[1] * 2.5)
         axes.set_xlabel("CPU time of one control step [µs]")
         axes.set_title(
-            f"Panda ({comparison['shapes']}s), {comparison['spheres']} spheres,"
-            f" {comparison['pairs']} pairs",
+            f"Panda ({comparison['shapes']}s), {comparison['spheres']} {comparison['scene']}"
+            f" spheres, {comparison['pairs']} pairs",
             size=11,
         )
         axes.grid(axis="x", alpha=0.3)
