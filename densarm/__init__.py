@@ -37,6 +37,7 @@ if TYPE_CHECKING:
         FileContentError,
         InvalidValueError,
         RobotDescriptionError,
+        SceneChangedError,
         UnknownNameError,
     )
     from densarm.fields.speed_law import SpeedParameters
@@ -131,6 +132,7 @@ __all__ = [
     "RobotDescriptionError",
     "Scenario",
     "Scene",
+    "SceneChangedError",
     "SensingParameters",
     "SimulationParameters",
     "SingleIntegrator",
@@ -186,6 +188,7 @@ _NAMES = {
         "FileContentError",
         "InvalidValueError",
         "RobotDescriptionError",
+        "SceneChangedError",
         "UnknownNameError",
     ),
     "fields.speed_law": ("SpeedParameters",),

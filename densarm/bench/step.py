@@ -1,7 +1,6 @@
 """The cost of one control step, against the calls of Pinocchio and coal that it cannot avoid."""
 
 import gc
-import itertools
 import resource
 import sys
 import time
@@ -33,7 +32,7 @@ from densarm.reference.reference import Reference
 from densarm.validation import positive_integer
 
 _OFF_REFERENCE = 1e-3  # of the states in every joint [rad or m]
-_BLOCK = 100  # consecutive states between two turns
+_BLOCK = 499  # states between two turns; no divisor of a visit to all, so that turns shift
 _PERCENT = (50.0, 99.0, 99.9)
 
 Step = Callable[[float, Array, Array], object]
@@ -105,19 +104,17 @@ def time_step(arm: str, shapes: str = "hull", pairs: int = 64, steps: int = 20_0
     preparation = time.perf_counter() - began
     bare, states = _bare_calls(clearance), _states(loaded, reference)
     first = float(_seconds(step, states[:1], np.empty((2, 1)))[0, 0])
-    turns, seconds = (step, bare), np.empty((2, 2, steps))
+    turns, seconds = (step, bare), np.full((2, 2, steps), np.nan)  # pages are touched here
     warm_up = np.empty((2, _BLOCK))
     for calls in turns:
         _seconds(calls, states[:_BLOCK], warm_up)
     memory, collections = _peak_memory(), _collections()
-    to_and_fro = itertools.cycle([*_blocks(states), *_blocks(states[::-1])])
-    done = 0
-    for block in to_and_fro:
+    to_and_fro = [*states, *states[::-1]]
+    for begin in range(0, steps, _BLOCK):
+        count = min(_BLOCK, steps - begin)
+        block = [to_and_fro[k % len(to_and_fro)] for k in range(begin, begin + count)]
         for calls, record in zip(turns, seconds, strict=True):
-            _seconds(calls, block[: steps - done], record[:, done:])
-        done += len(block)
-        if done >= steps:
-            break
+            _seconds(calls, block, record[:, begin:])
     step_us, bare_us = (float(np.median(record[0])) * 1e6 for record in seconds)
     return StepTiming(
         step_us,
@@ -127,7 +124,7 @@ def time_step(arm: str, shapes: str = "hull", pairs: int = 64, steps: int = 20_0
         steps,
         _percentiles(seconds[0, 1]),
         _percentiles(seconds[1, 1]),
-        _percentiles(_least_of_visits(seconds[0, 1], 2 * len(states))),
+        _percentiles(_least_of_visits(seconds[0, 1], len(to_and_fro))),
         preparation,
         1e6 * first,
         _peak_memory() - memory,
@@ -145,10 +142,6 @@ def _least_of_visits(seconds: Array, period: int) -> Array:
     rows = np.pad(seconds, (0, visits * period - len(seconds)), constant_values=np.inf)
     least = rows.reshape(visits, period).min(axis=0)
     return np.asarray(least[np.isfinite(least)])
-
-
-def _blocks(states: list[State]) -> list[list[State]]:
-    return [states[k : k + _BLOCK] for k in range(0, len(states), _BLOCK)]
 
 
 def _seconds(step: Step, states: list[State], out: Array) -> Array:
