@@ -21,10 +21,11 @@ from densarm.reference.smooth_path import SmoothPath
 from densarm.reference.timing_parameters import TimingParameters
 
 _UNLIMITED = 1e4  # stands for an infinite limit, which TOPP-RA's solver does not take
-_GRID_STEP = 0.02  # [rad] between grid points at most
-_GRID = (100, 1000)
+_GRID_STEP = 0.0125  # [rad] between grid points at most
+_GRID = (200, 1000)
 _GRID_SHARE = 0.98  # of the limits at grid points; the rest is for what lies between them
-_SLOWDOWNS = 1.02 ** np.arange(50)  # tried in turn until the limits hold at every sample
+_SLOWDOWNS = 50  # tried in turn until the limits hold at every sample
+_LEAST_SLOWDOWN = 1.002
 _CHECKED = 4  # samples from one brake that is checked to the next
 _ROUNDS = 12  # of slowing down where stopping is not proved
 _HALVINGS = 7  # of the range that the largest speed to stop from is in
@@ -99,10 +100,12 @@ def _timing_within_limits(
 ) -> _Timing | None:
     if speed is None or not np.isfinite(speed).all():
         return None
-    for slowdown in _SLOWDOWNS:
-        timing = _sampled(path, grid, speed / slowdown, period)
-        if _is_within_limits(arm, timing.reference, parameters):
+    for _ in range(_SLOWDOWNS):
+        timing = _sampled(path, grid, speed, period)
+        used = _largest_share(arm, timing.reference, parameters)
+        if used <= 1.0:
             return timing
+        speed = speed / max(_LEAST_SLOWDOWN, math.sqrt(used))
     return None
 
 
@@ -156,21 +159,20 @@ def _lower(
     np.minimum.at(cap, cell + 1, allowed)
 
 
-def _is_within_limits(arm: Arm, reference: Reference, parameters: TimingParameters) -> bool:
-    """Check all samples: TOPP-RA holds the limits at its grid points only."""
-    limits = arm.limits
-    if (np.abs(reference.velocity) > parameters.velocity_share * limits.velocity).any():
-        return False
-    acceleration = np.diff(reference.velocity, axis=0) / reference.period
-    if (np.abs(acceleration) > parameters.acceleration_share * limits.acceleration).any():
-        return False
-    torque = joint_torques(
-        arm,
-        arm.configurations(reference.position[:-1]),
-        reference.velocity[:-1],
-        acceleration,
+def _largest_share(arm: Arm, reference: Reference, parameters: TimingParameters) -> float:
+    """Return how much of what it may use a reference uses at most; TOPP-RA knows grid points only.
+
+    The limits are those of velocity, acceleration and torque, at all samples.
+    """
+    v, limits = reference.velocity, arm.limits
+    a = np.diff(v, axis=0) / reference.period
+    torque = joint_torques(arm, arm.configurations(reference.position[:-1]), v[:-1], a)
+    used = (
+        np.abs(v) / (parameters.velocity_share * limits.velocity),
+        np.abs(a) / (parameters.acceleration_share * limits.acceleration),
+        np.abs(torque) / (parameters.torque_share * limits.effort),
     )
-    return bool((np.abs(torque) <= parameters.torque_share * limits.effort).all())
+    return max(float(share.max()) for share in used)
 
 
 def _velocity_cap(arm: Arm, path: SmoothPath, grid: Array, parameters: TimingParameters) -> Array:
