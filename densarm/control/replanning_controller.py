@@ -99,8 +99,7 @@ class ReplanningController:
     def _has_lost(self, t: float, q: Array) -> bool:
         reference = self._plan.reference
         if reference is not None and t - self._began <= reference.duration:
-            wanted = self._arm.configurations(reference.update(t - self._began)[0])
-            return self._error(wanted, q) > _LOST
+            return self._plan.controller.tracking_error > _LOST
         if self._stood is None or self._error(self._stood[1], q) > _STANDING:
             self._stood = t, q.copy()
         is_late = t - self._stood[0] >= self._patience

@@ -13,10 +13,10 @@ PERIOD = 0.01
 
 
 class Recorder:
-    """Keeps the times that it is called at."""
+    """Keeps the times that it is called at, and has the tracking error that it is given."""
 
     def __init__(self, arm):
-        self.arm, self.times = arm, []
+        self.arm, self.times, self.tracking_error = arm, [], 0.0
 
     def torque(self, t, *_):
         self.times.append(t)
@@ -57,6 +57,7 @@ def test_pushed_arm_is_stopped_first_and_has_a_new_plan_from_where_it_rests(arm)
     on, off = arm.configuration([0.1, 0.0, 0.0]), arm.configuration([0.4, 0.0, 0.0])
     rest, moving = np.zeros(arm.nv), np.full(arm.nv, 0.5)
     controller.torque(0.0, on, moving)
+    followed.tracking_error = 0.4
     controller.torque(0.1, off, moving)
     assert first.controller.is_stopping
     controller.torque(0.2, off, moving)

@@ -79,7 +79,8 @@ def test_behind_a_wall_is_a_maximum(arm, across):
     start = np.array([-0.6, -0.1])
     path = DirectGuide().plan(start, np.array(goal), 0)
     chain = SubGoalChain(bound, path, SensingParameters())
-    guided = GuidedDensity(bound.clearance, chain, 0.0, DensityParameters(), np.inf)
+    distance = TorusDistance(arm, np.array(goal), kappa=np.inf)
+    guided = GuidedDensity(bound.clearance, chain, 0.0, DensityParameters(), distance)
     curve = PlanningSystem(guided, bound).integrate(start)
     assert not curve.reached
     assert curve.detail.startswith("maximum of the density at joint positions (-0.1")
