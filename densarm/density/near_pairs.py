@@ -190,9 +190,11 @@ def _go(
         way[j] += step[j]
         x, y = q[idx_q[j]], q_last[idx_q[j]]
         holds &= low[j] <= x <= high[j] and low[j] <= y <= high[j] and way[j] < _LONGEST_WAY
-    if not holds:
-        way[:] = 0.0
-    q_last[:] = q
+    # Entry by entry: a slice would compile, for seconds, the words of errors that cannot occur.
+    for j in range(way.shape[0]):
+        way[j] = way[j] if holds else 0.0
+    for i in range(q.shape[0]):
+        q_last[i] = q[i]
     return holds
 
 
