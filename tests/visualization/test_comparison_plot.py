@@ -6,7 +6,7 @@ from densarm.visualization.comparison_plot import comparison_figure, save_compar
 
 
 def run(outcome, time):
-    return MethodRun((0.0, 0.0), outcome, "", time, 2.0 * time, 0.01 * time, 50.0, 0.1, 20.0)
+    return MethodRun((0.0, 0.0), outcome, "", time, 2.0 * time, 0.01 * time, 50.0, 0.1, 0.3, 20.0)
 
 
 @pytest.fixture(scope="module")
