@@ -5,6 +5,7 @@ from pathlib import Path
 import click
 
 from densarm.cli.exit_status import ExitStatus
+from densarm.cli.first_run import compiling_meanwhile
 from densarm.cli.json_file import write_json
 from densarm.cli.output_option import output_option
 from densarm.cli.picture_options import picture_options, write_pictures
@@ -56,7 +57,8 @@ def run(
         from densarm.outcome import Outcome
         from densarm.scenario import load_scenario
 
-        trajectory = simulate(load_scenario(scenario), guide, seed, on_progress=report)
+        with compiling_meanwhile():
+            trajectory = simulate(load_scenario(scenario), guide, seed, on_progress=report)
         report("proving")
         certificate = trajectory.certificate
         report("writing")

@@ -86,7 +86,7 @@ class DensityTracking:
         density.update_psi(q)
         self._dynamics.update(q, v)
         tau = np.empty(len(v))
-        _write_torque(t, q, v, density.log_psi, tau, *self._fixed)
+        write_torque(t, q, v, density.log_psi, tau, *self._fixed)
         return tau
 
 
@@ -97,7 +97,7 @@ def _mass_data(density: NavigationDensity[TorusDistance]) -> pin.Data | None:
 
 
 @compiled
-def _write_torque(
+def write_torque(
     t: float,
     q: Array,
     v: Array,
