@@ -1,20 +1,18 @@
 """What distances and planes prove of the pairs on one arc of a joint-space segment."""
 
-import math
-
 import numpy as np
 from numpy.typing import NDArray
 
 from densarm.arrays import Array
 from densarm.compiled import compiled
-from densarm.proof.moving_hulls import boxes_apart
+from densarm.proof.box_faces import faces_prove, stays_apart
 from densarm.proof.separation import plane_gap, separation
 
 
 @compiled
 def keep_unproved(
+    joint: NDArray[np.int64],
     box: Array,
-    ball: Array,
     points: Array,
     neighbours: NDArray[np.int64],
     first_neighbour: NDArray[np.int64],
@@ -24,17 +22,20 @@ def keep_unproved(
     corners: NDArray[np.int64],
     order: NDArray[np.int64],
     pose: Array,
+    pose_a: Array,
+    pose_b: Array,
     motion: Array,
+    bend: Array,
     pairs_on_arcs: NDArray[np.int64],
     begin: int,
     end: int,
     planes: Array,
 ) -> int:
-    """Move to the front the pairs of an arc that distances in its middle do not prove.
+    """Move to the front the pairs of an arc that neither boxes nor distances in its middle prove.
 
     Args:
-        box: see `MovingHulls`, as the next six.
-        ball: around each shape.
+        joint: see `MovingHulls`, as the next six.
+        box: around each shape.
         points: corners of the hulls.
         neighbours: of the corners.
         first_neighbour: of each corner.
@@ -44,7 +45,10 @@ def keep_unproved(
         corners: of each pair, see `separation`.
         order: in which pairs are looked at (K,); one that is not clear is put first.
         pose: of the shapes in the middle of the arc (S, 12).
+        pose_a: at one end of it (S, 12).
+        pose_b: at the other end (S, 12).
         motion: bounds on the motion along the arc (S, njoints) [m].
+        bend: bounds on the acceleration along the arc (S, njoints) [m].
         pairs_on_arcs: pairs, and arcs on which they are not proved (N, 2).
         begin: index of the first pair on this arc.
         end: index after the last.
@@ -59,7 +63,8 @@ def keep_unproved(
         k = pairs_on_arcs[n, 0]
         i, j, c = pairs[k, 0], pairs[k, 1], pairs[k, 2]
         half = 0.5 * (motion[i, c] + motion[j, c])
-        if boxes_apart(box, ball, pose, i, j) - kept[k] > half:
+        bent = 0.25 * (bend[i, c] + bend[j, c])  # half the time, a quarter of the way
+        if joint[j] == c and faces_prove(box, j, i, pose, pose_a, pose_b, kept[k], half, bent):
             continue
         held = kept[k] + radius[i] + radius[j]
         gap = (
@@ -153,8 +158,7 @@ def append_unproved(
             y,
             z,
         ) - (kept[k] + radius[i] + radius[j])
-        bent = 0.25 * (bend[i, c] + bend[j, c])  # half the time, a quarter of the way
-        if not (gap > 0.0 and bent < 2.0 * (math.sqrt(gap) + math.sqrt(planes[n, 3])) ** 2):
+        if not stays_apart(planes[n, 3], gap, 0.25 * (bend[i, c] + bend[j, c])):
             halves[waiting, 0], halves[waiting, 1] = k, half
             waiting += 1
     return waiting

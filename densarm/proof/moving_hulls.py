@@ -1,6 +1,5 @@
 """MovingHulls: the bodies of an arm and its scene as rounded hulls, placed by compiled code."""
 
-import math
 from functools import lru_cache
 from itertools import pairwise
 from typing import NamedTuple
@@ -45,7 +44,10 @@ class MovingHulls(NamedTuple):
     radius: Array
     """By which each hull is enlarged (S,) [m]."""
     pairs: NDArray[np.int64]
-    """Both shapes of each pair, and the last joint that moves both (K, 3)."""
+    """Both shapes of each pair, and the last joint that moves both (K, 3).
+
+    If one of them is fixed to that joint, as it is in a chain, it is the second.
+    """
 
 
 def moving_hulls(clearance: Clearance) -> tuple[MovingHulls, NDArray[np.int64]]:
@@ -73,6 +75,9 @@ def _moving_hulls(clearance: Clearance, _: int) -> tuple[MovingHulls, NDArray[np
     joint = np.array([item.parentJoint for item in shapes], dtype=np.int64)
     parent, joints = joint_table(clearance.arm.model)
     shared = [_last_shared(parent, *joint[pair]) for pair in clearance.pair_shapes]
+    last = np.array(shared, dtype=np.int64)
+    is_first = joint[clearance.pair_shapes[:, :1]] == last[:, np.newaxis]
+    pairs = np.where(is_first, clearance.pair_shapes[:, ::-1], clearance.pair_shapes)
     bodies = MovingHulls(
         parent=parent,
         joints=joints,
@@ -84,9 +89,9 @@ def _moving_hulls(clearance: Clearance, _: int) -> tuple[MovingHulls, NDArray[np
         neighbours=hulls.neighbours,
         first_neighbour=hulls.first_neighbour,
         radius=hulls.radius,
-        pairs=np.column_stack([clearance.pair_shapes, np.array(shared, dtype=np.int64)]),
+        pairs=np.column_stack([pairs, last]),
     )
-    return bodies, hulls.first[clearance.pair_shapes]
+    return bodies, hulls.first[pairs]
 
 
 def _last_shared(parent: NDArray[np.int64], joint: int, other: int) -> int:
@@ -128,24 +133,3 @@ def place(
     for shape in range(joint.size):
         if joint[shape] > 0:
             write_composed(joint_pose, joint[shape], frame, shape, shape_pose)
-
-
-@compiled
-def boxes_apart(box: Array, ball: Array, pose: Array, i: int, j: int) -> float:
-    """Return by how much the ball around one of two shapes is outside the other's box [m]."""
-    one: float = _outside_box(box, pose, i, j) - ball[i]
-    other: float = _outside_box(box, pose, j, i) - ball[j]
-    return max(other, one)
-
-
-@compiled
-def _outside_box(box: Array, pose: Array, i: int, j: int) -> float:
-    """Return how far the middle of shape i is outside the box around shape j [m]."""
-    x, y, z = pose[i, 9] - pose[j, 9], pose[i, 10] - pose[j, 10], pose[i, 11] - pose[j, 11]
-    square = 0.0
-    for k in range(3):
-        along = pose[j, k] * x + pose[j, 3 + k] * y + pose[j, 6 + k] * z
-        beyond = abs(along) - box[j, k]
-        if beyond > 0.0:
-            square += beyond * beyond
-    return math.sqrt(square)

@@ -96,8 +96,8 @@ def _segment_is_clear(
     step: Array,
 ) -> bool:
     """Prove all pairs; arcs on which some are not proved are halved, all of a length in turn."""
-    joint_pose, joint_end = np.empty((parent.size, 12)), np.empty((parent.size, 12))
-    shape_pose, shape_end = frame.copy(), frame.copy()
+    joint_pose, joint_a = np.empty((parent.size, 12)), np.empty((parent.size, 12))
+    joint_b, pose, pose_a, pose_b = joint_a.copy(), frame.copy(), frame.copy(), frame.copy()
     motion, bend = np.empty((joint.size, parent.size)), np.empty((joint.size, parent.size))
     count, share, longest = order.size, 1.0, 0.0
     none = count - count  # functions that take a literal 0 are compiled for it, and again
@@ -113,24 +113,16 @@ def _segment_is_clear(
             arc, end = pairs_on_arcs[begin, 1], begin + 1
             while end < count and pairs_on_arcs[end, 1] == arc:
                 end += 1
-            at = (arc + 0.5) * share
-            place(parent, joints, joint, frame, angles, step, at, joint_pose, shape_pose)
+            at = arc * share
+            place(parent, joints, joint, frame, angles, step, at, joint_a, pose_a)
+            place(parent, joints, joint, frame, angles, step, at + 0.5 * share, joint_pose, pose)
+            place(parent, joints, joint, frame, angles, step, at + share, joint_b, pose_b)
             write_motion_bounds(
-                parent,
-                joints,
-                joint,
-                ball,
-                lever,
-                step,
-                share,
-                joint_pose,
-                shape_pose,
-                motion,
-                bend,
+                parent, joints, joint, ball, lever, step, share, joint_pose, pose, motion, bend
             )
             unproved = keep_unproved(
+                joint,
                 box,
-                ball,
                 points,
                 neighbours,
                 first_neighbour,
@@ -139,8 +131,11 @@ def _segment_is_clear(
                 kept,
                 corners,
                 order,
-                shape_pose,
+                pose,
+                pose_a,
+                pose_b,
                 motion,
+                bend,
                 pairs_on_arcs,
                 begin,
                 end,
@@ -148,29 +143,46 @@ def _segment_is_clear(
             )
             if unproved < 0:
                 return False
-            for side in range(2 if unproved > begin else 0):
-                at = (arc + side) * share
-                place(parent, joints, joint, frame, angles, step, at, joint_end, shape_end)
-                waiting = append_unproved(
-                    points,
-                    neighbours,
-                    first_neighbour,
-                    radius,
-                    pairs,
-                    kept,
-                    corners,
-                    joint_pose,
-                    joint_end,
-                    shape_end,
-                    bend,
-                    pairs_on_arcs,
-                    begin,
-                    unproved,
-                    planes,
-                    2 * arc + side,
-                    halves,
-                    waiting,
-                )
+            waiting = append_unproved(
+                points,
+                neighbours,
+                first_neighbour,
+                radius,
+                pairs,
+                kept,
+                corners,
+                joint_pose,
+                joint_a,
+                pose_a,
+                bend,
+                pairs_on_arcs,
+                begin,
+                unproved,
+                planes,
+                2 * arc,
+                halves,
+                waiting,
+            )
+            waiting = append_unproved(
+                points,
+                neighbours,
+                first_neighbour,
+                radius,
+                pairs,
+                kept,
+                corners,
+                joint_pose,
+                joint_b,
+                pose_b,
+                bend,
+                pairs_on_arcs,
+                begin,
+                unproved,
+                planes,
+                2 * arc + 1,
+                halves,
+                waiting,
+            )
             begin = end
         if waiting == 0:
             return True
