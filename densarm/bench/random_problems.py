@@ -26,7 +26,7 @@ _DRAWS = 3000  # of one end in one scene
 _CHECKS = 300  # of those, where the end effector is in its region
 _ROOM = 0.005  # that ends keep from contact, in units of the reach
 _APART = 0.3  # of the ends' end effectors, at least, in units of the reach
-_BUDGET = PathGuideParameters(iterations=30_000, searches=1, shortcuts=1)  # the default: 2 x 10,000
+_BUDGET = PathGuideParameters(iterations=100_000, searches=1, shortcuts=1)  # the default: 20,000
 
 
 def random_problems(

@@ -31,7 +31,7 @@ def faces_prove(
         half: bound on how far they move against each other along half the arc [m].
         bend: bound on their acceleration against each other along half the arc [m].
     """
-    axis, side, gap = 0, 1.0, -1.0
+    axis, side, gap = one - one, 1.0, -1.0  # a literal 0 would be compiled for
     for k in range(3):
         above = face_gap(box, one, k, 1.0, other, pose)
         below = face_gap(box, one, k, -1.0, other, pose)
