@@ -1,4 +1,4 @@
-"""The first run on a machine compiles kernels: those for after planning in a second process."""
+"""The first run on a machine compiles kernels, a part of them in a second process."""
 
 import os
 import subprocess
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 @contextmanager
 def compiling_meanwhile() -> Iterator[None]:
-    """Let a second process compile for control and pictures, where nothing was compiled before.
+    """Let a second process compile for proofs, control and pictures, where nothing was compiled.
 
     Compiled code is kept on disk, where this process finds it when it gets that far.
     """
@@ -45,8 +45,28 @@ def _is_compiled() -> bool:
     return any(folder.glob("density_tracking.write_torque-*.nbi"))
 
 
-def compile_all_but_planning() -> None:
-    """Hold an arm still for a moment and draw it."""
+def compile_meanwhile() -> None:
+    """Do what takes compiled code of many kinds, in the order in which it will be missed."""
+    _separate_two_boxes()
+    _hold_still_and_draw()
+
+
+def _separate_two_boxes() -> None:
+    import numpy as np
+
+    from densarm.proof.rounded_hulls import rounded_hulls
+    from densarm.proof.separation import separation
+    from densarm.shapes import box_hull
+
+    hulls = rounded_hulls([box_hull([1.0, 1.0, 1.0])] * 2)
+    points, first, *edges, _ = hulls
+    poses, corners = np.zeros((2, 12)), np.full((1, 4, 2), -1)
+    poses[:, :9], poses[1, 9], corners[0, 0] = np.eye(3).ravel(), 2.0, first[:2]
+    space = np.empty((3, 4, 4))
+    separation(*(points, *edges, poses, 0, 1, 0.0, 1.0, corners, 0, *space, 0))
+
+
+def _hold_still_and_draw() -> None:
     from densarm.closed_loop import simulate
     from densarm.scenario import load_scenario
     from densarm.visualization.picture_file import save_picture
@@ -70,4 +90,4 @@ class _Stay:
 
 
 if __name__ == "__main__":
-    compile_all_but_planning()
+    compile_meanwhile()

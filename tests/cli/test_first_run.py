@@ -24,7 +24,7 @@ def processes(monkeypatch):
 
 
 def test_no_process_where_kernels_are_compiled(processes):
-    first_run.compile_all_but_planning()
+    first_run.compile_meanwhile()
     with first_run.compiling_meanwhile():
         pass
     assert not processes
@@ -38,13 +38,14 @@ def test_the_process_ends_with_the_run(processes, monkeypatch):
 
 
 def test_what_follows_planning_is_compiled_without_planning():
-    """No kernel of proofs, those of steps and pictures."""
+    """No proof of a segment, but its largest part, and the kernels of steps and pictures."""
     code = (
-        "from densarm.cli.first_run import compile_all_but_planning as work\n"
+        "from densarm.cli.first_run import compile_meanwhile as work\n"
         "import sys; work()\n"
         "from densarm.control.density_tracking import write_torque\n"
         "from densarm.visualization.rasterizer import _fill\n"
-        "assert write_torque.signatures and _fill.signatures\n"
+        "from densarm.proof.separation import separation\n"
+        "assert write_torque.signatures and _fill.signatures and separation.signatures\n"
         "assert not any(m.endswith('arc_proof') and sys.modules[m].keep_unproved.signatures\n"
         "               for m in list(sys.modules))\n"
     )
