@@ -88,13 +88,15 @@ def plan_motion(
     ends = min(bound.slack(q).min(initial=np.inf) for q in (start, depart, arrive))
     room = max(0.0, min(control.path_margin, _END_SHARE * ends))
     began = time.perf_counter()
-    for share in _ROOM_SHARES:
-        path_bound = bound.with_margin(control.margin + share * room)
+    margins = [control.margin + share * room for share in _ROOM_SHARES]
+    for margin in margins:
+        path_bound = bound.with_margin(margin)
         path = _chosen(guide, scenario, path_bound).plan(depart, arrive, scenario.seed)
         if isinstance(path, GuidePath):
             break
     if isinstance(path, NoPath):
-        return path
+        tried = " and ".join(f"{1e3 * margin:.3g}" for margin in margins)
+        return NoPath(f"{path.reason}, with margins of {tried} mm")
     plan = MotionPlan(scenario, path, bound, guide_time=time.perf_counter() - began)
     if control.form != ControlForm.TRACKING:
         return plan
