@@ -72,7 +72,7 @@ def read_toml(path: Path) -> dict[str, Any]:
     """
     try:
         return tomllib.loads(read_text(path))
-    except tomllib.TOMLDecodeError as error:
+    except ValueError as error:  # also for a date that no calendar has
         raise FileContentError(path, f"not TOML: {error}") from None
     except RecursionError:
         raise FileContentError(path, "not TOML: nested too deeply") from None

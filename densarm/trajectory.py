@@ -133,7 +133,7 @@ class Trajectory:
         try:
             _check_archive(path)
             with Path(path).open("rb") as file, np.load(file, allow_pickle=False) as data:
-                arrays = {name: np.asarray(data[name], dtype=np.float64) for name in _ARRAYS}
+                arrays = {name: _floats(name, data[name]) for name in _ARRAYS}
                 scenario = json.loads(str(data["scenario"]))
                 result = json.loads(str(data["result"]))
             deviation = result["tracking_error_rad"]
@@ -155,7 +155,7 @@ class Trajectory:
             raise FileContentError(path, f"not a run: {error}") from None
         except (MemoryError, RecursionError):
             raise FileContentError(path, "not a run: too large, or nested too deeply") from None
-        except (ValueError, KeyError, TypeError, AttributeError, EOFError, *_DAMAGE) as error:
+        except (*_FAULTS, *_DAMAGE) as error:
             raise FileContentError(path, f"not a run: {' '.join(str(error).split())}") from None
 
     def _checked(self) -> Trajectory:
@@ -172,6 +172,12 @@ class Trajectory:
         return self
 
 
+def _floats(name: str, array: Any) -> Array:
+    if array.dtype != np.float64:
+        raise ValueError(f"{name} holds {array.dtype}, not float64")
+    return np.asarray(array)
+
+
 def _check_archive(path: str | Path) -> None:
     """Refuse a file that is no .npz, or one that is small packed and huge unpacked."""
     if not Path(path).is_file():
@@ -186,5 +192,6 @@ def _check_archive(path: str | Path) -> None:
 
 _MAX_BYTES = 4_000_000_000  # unpacked; the longest run of a seven-joint arm has half of it
 _UNIT_TOLERANCE = 1e-6
+_FAULTS = (ValueError, OverflowError, KeyError, TypeError, AttributeError, EOFError)
 _DAMAGE = (BadZipFile, zlib.error, NotImplementedError)  # what reading a damaged archive raises
 _ARRAYS = ("time", "q", "v", "tau", "clearance")

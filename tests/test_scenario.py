@@ -136,6 +136,7 @@ def test_cut_joints(tmp_path):
     ("text", "message"),
     [
         ("x = ", "not TOML"),
+        ("x = 2023-13-45", "not TOML"),
         (
             "gaols = 1\n" + BASE,
             "unknown key 'gaols'; did you mean 'gains'? (known: control, density",

@@ -164,6 +164,12 @@ def test_wrong_shapes_and_values(tmp_path, content, name):
         message = error_of(written(path, {**content, name: wrong}))
         assert name in message or name == "time"  # whose length the others are compared with
     error_of(written(path, {**content, name: np.array("text")}))
+    assert "complex128" in error_of(written(path, {**content, name: right.astype(complex)}))
+
+
+def test_a_number_beyond_all_floats(tmp_path, content):
+    result = json.loads(str(content["result"])) | {"plan_time_s": 10**400}
+    error_of(written(tmp_path / "run.npz", {**content, "result": np.array(json.dumps(result))}))
 
 
 def test_an_array_that_claims_to_be_larger_than_memory(tmp_path, content):
