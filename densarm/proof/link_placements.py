@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 from densarm.arrays import Array
 from densarm.compiled import compiled
 
-_AXIS, _SLIDES = 12, 15  # columns of a table of joints
+AXIS, SLIDES = slice(12, 15), 15
+"""Columns of a table of joints: its axis, and whether it slides along it."""
 _IDENTITY = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
 
 
@@ -34,12 +35,12 @@ def joint_table(model: pin.Model) -> tuple[NDArray[np.int64], Array]:
     """
     table = np.zeros((model.njoints, 16))
     for index, placement in enumerate(model.jointPlacements):
-        table[index, :_AXIS] = pose_row(placement)
+        table[index, : AXIS.start] = pose_row(placement)
     for index in range(1, model.njoints):
         subspace = model.joints[index].createData().S.reshape(6)
         slides = not subspace[3:].any()
-        table[index, _AXIS:_SLIDES] = subspace[:3] if slides else subspace[3:]
-        table[index, _SLIDES] = slides
+        table[index, AXIS] = subspace[:3] if slides else subspace[3:]
+        table[index, SLIDES] = slides
     return np.array(list(model.parents), dtype=np.int64), table
 
 

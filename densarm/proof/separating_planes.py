@@ -112,7 +112,7 @@ def _segment_is_clear(
     for n in range(count):
         pairs_on_arcs[n, 0], pairs_on_arcs[n, 1] = order[first + n], 0
     for rate in step:
-        longest = rate if rate > longest else max(longest, -rate)
+        longest = max(longest, abs(rate))
     while True:
         planes, halves = np.empty((count, 4)), np.empty((2 * count, 2), np.int64)
         begin = waiting = none
@@ -150,46 +150,28 @@ def _segment_is_clear(
             )
             if unproved < 0:
                 return False
-            waiting = append_unproved(
-                points,
-                neighbours,
-                first_neighbour,
-                radius,
-                pairs,
-                kept,
-                corners,
-                joint_pose,
-                joint_a,
-                pose_a,
-                bend,
-                pairs_on_arcs,
-                begin,
-                unproved,
-                planes,
-                2 * arc,
-                halves,
-                waiting,
-            )
-            waiting = append_unproved(
-                points,
-                neighbours,
-                first_neighbour,
-                radius,
-                pairs,
-                kept,
-                corners,
-                joint_pose,
-                joint_b,
-                pose_b,
-                bend,
-                pairs_on_arcs,
-                begin,
-                unproved,
-                planes,
-                2 * arc + 1,
-                halves,
-                waiting,
-            )
+            for side in range(2):
+                joint_end, pose_end = (joint_a, pose_a) if side == 0 else (joint_b, pose_b)
+                waiting = append_unproved(
+                    points,
+                    neighbours,
+                    first_neighbour,
+                    radius,
+                    pairs,
+                    kept,
+                    corners,
+                    joint_pose,
+                    joint_end,
+                    pose_end,
+                    bend,
+                    pairs_on_arcs,
+                    begin,
+                    unproved,
+                    planes,
+                    2 * arc + side,
+                    halves,
+                    waiting,
+                )
             begin = end
         if waiting == 0:
             return True

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from densarm.arrays import Array
 from densarm.clearance import DISTANCE_TOLERANCE, Clearance, joint_support
 from densarm.proof.bisection import Pairs, bisect
+from densarm.proof.link_placements import AXIS, SLIDES, joint_table
 from densarm.shapes import extreme_points
 from densarm.validation import non_negative
 
@@ -40,11 +41,12 @@ class SweptBound:
         self.clearance = clearance
         self.arm = clearance.arm
         self.margin = non_negative("margin", margin)
-        self.shape_lever = self._shape_levers()
+        _, joints = joint_table(self.arm.model)
+        self.shape_lever = self._shape_levers(joints)
         """For each shape the bounds r_j of the joints that move it (S, nv), else 0 [m/rad or 1]."""
         self.lever = self._pair_levers()
         """The bounds r_kj (K, nv) [m/rad, 1 for prismatic joints]."""
-        self.slides = _slides(self.arm.model)
+        self.slides: NDArray[np.bool_] = joints[1:, SLIDES] > 0.0
         """Which joints are prismatic (nv,); beyond their limits the bounds do not hold."""
 
     def with_margin(self, margin: float) -> "SweptBound":
@@ -108,9 +110,9 @@ class SweptBound:
         )
         return None if len(result.failing) else result.evaluated
 
-    def _shape_levers(self) -> Array:
+    def _shape_levers(self, joints: Array) -> Array:
         model, shapes = self.arm.model, self.clearance.geometry_model.geometryObjects
-        return np.array([_levers(model, item) for item in shapes]).reshape(-1, model.nv)
+        return np.array([_levers(model, joints, item) for item in shapes]).reshape(-1, model.nv)
 
     def _pair_levers(self) -> Array:
         model, shapes = self.arm.model, self.clearance.geometry_model.geometryObjects
@@ -121,7 +123,7 @@ class SweptBound:
         return np.asarray((lever[first] + lever[second]) * (1.0 - shared))
 
 
-def _levers(model: pin.Model, shape: pin.GeometryObject) -> Array:
+def _levers(model: pin.Model, joints: Array, shape: pin.GeometryObject) -> Array:
     """Return, for one shape, the bound r_j (nv,) of every joint that moves it, else 0."""
     levers = np.zeros(model.nv)
     if shape.parentJoint == 0:  # fixed, and perhaps without end
@@ -132,7 +134,7 @@ def _levers(model: pin.Model, shape: pin.GeometryObject) -> Array:
     while joint > 0:
         # In all configurations the shape is within `reach` of the hull of `points`, which are
         # fixed in the frame of `joint`.
-        axis, slide = _axis_and_slide(model, joint)
+        axis, slide = joints[joint, AXIS], joints[joint, SLIDES] > 0.0
         across = points - np.outer(points @ axis, axis)
         farthest = reach + float(np.linalg.norm(across, axis=1).max())
         levers[model.joints[joint].idx_v] = 1.0 if slide else farthest
@@ -141,20 +143,6 @@ def _levers(model: pin.Model, shape: pin.GeometryObject) -> Array:
         points = model.jointPlacements[joint].translation[np.newaxis]
         joint = model.parents[joint]
     return levers
-
-
-def _axis_and_slide(model: pin.Model, joint: int) -> tuple[Array, bool]:
-    """Return the joint's axis in its own frame, and whether it slides along it."""
-    subspace = model.joints[joint].createData().S.reshape(6)
-    slide = bool(np.abs(subspace[3:]).max() == 0.0)
-    return (subspace[:3] if slide else subspace[3:]), slide
-
-
-def _slides(model: pin.Model) -> NDArray[np.bool_]:
-    slides = np.zeros(model.nv, bool)
-    for joint in range(1, model.njoints):
-        slides[model.joints[joint].idx_v] = _axis_and_slide(model, joint)[1]
-    return slides
 
 
 def _extension(model: pin.Model, joint: int) -> float:
