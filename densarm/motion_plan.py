@@ -88,7 +88,7 @@ def plan_motion(
     ends = min(bound.slack(q).min(initial=np.inf) for q in (start, depart, arrive))
     room = max(0.0, min(control.path_margin, _END_SHARE * ends))
     began = time.perf_counter()
-    margins = [control.margin + share * room for share in _ROOM_SHARES]
+    margins = list(dict.fromkeys(control.margin + share * room for share in _ROOM_SHARES))
     for margin in margins:
         path_bound = bound.with_margin(margin)
         path = _chosen(guide, scenario, path_bound).plan(depart, arrive, scenario.seed)
