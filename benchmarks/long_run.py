@@ -25,20 +25,11 @@ from timing.surroundings import print_surroundings, surroundings
 
 from densarm.arm import load_arm
 from densarm.arrays import Array
+from densarm.bench.step import full_sensing_density
 from densarm.bench.swing_among_spheres import clearance_among_spheres, swing
 from densarm.cli.json_file import write_json
 from densarm.control.density_tracking import DensityTracking
 from densarm.control.gains import Gains
-from densarm.density import (
-    DensityParameters,
-    JointLimitSet,
-    NavigationDensity,
-    NearClearanceSet,
-    NearPairs,
-    TorusDistance,
-)
-from densarm.fields.sub_goal_chain import SensingParameters
-from densarm.proof.swept_bound import SweptBound
 from densarm.reference.reference import Reference
 from densarm.simulation.plant import Integrator, PinocchioPlant
 
@@ -92,15 +83,7 @@ def run(count: int, pairs: int, seed: int = 0) -> tuple[Steps, Memory]:
     swinging = swing(arm)
     clearance = clearance_among_spheres(arm, swinging, pairs)
     plant = PinocchioPlant(arm, PERIOD, Integrator.SEMI_IMPLICIT_EULER)
-    sensing = SensingParameters()
-    density = NavigationDensity(
-        [
-            NearClearanceSet(NearPairs(SweptBound(clearance)), 0.0, sensing.distance),
-            JointLimitSet(arm, sensing.joint),
-        ],
-        TorusDistance(arm, swinging.position[-1]),
-        DensityParameters(),
-    )
+    density = full_sensing_density(clearance, arm.configuration(swinging.position[-1]))
     legs = references(swinging, seed)
     q, v = next(references(swinging, seed)).position[0], np.zeros(arm.nv)
     DensityTracking(arm, density, next(references(swinging, seed)), Gains()).torque(0.0, q, v)

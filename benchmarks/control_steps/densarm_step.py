@@ -2,19 +2,10 @@
 
 from control_steps.task import ControlTask
 from densarm.arrays import Array
+from densarm.bench.step import full_sensing_density
 from densarm.control.density_tracking import DensityTracking
 from densarm.control.gains import Gains
-from densarm.density import (
-    DensityParameters,
-    JointLimitSet,
-    NavigationDensity,
-    NearClearanceSet,
-    NearPairs,
-    TorusDistance,
-    UnsafeSet,
-)
 from densarm.fields.sub_goal_chain import SensingParameters
-from densarm.proof.swept_bound import SweptBound
 
 
 class DensarmStep:
@@ -23,12 +14,8 @@ class DensarmStep:
     def __init__(self, task: ControlTask) -> None:
         self._task = task
         arm, sensing = task.arm, SensingParameters()
-        unsafe: list[UnsafeSet] = [
-            NearClearanceSet(NearPairs(SweptBound(task.clearance)), 0.0, sensing.distance),
-            JointLimitSet(arm, sensing.joint),
-        ]
-        goal_distance = TorusDistance(arm, arm.configuration(task.reference.position[-1]))
-        density = NavigationDensity(unsafe, goal_distance, DensityParameters())
+        goal = arm.configuration(task.reference.position[-1])
+        density = full_sensing_density(task.clearance, goal)
         self._controller = DensityTracking(arm, density, task.reference, Gains())
         self.name = "densarm"
         self.set_up = (

@@ -100,7 +100,8 @@ def time_step(arm: str, shapes: str = "hull", pairs: int = 64, steps: int = 20_0
     reference = swing(loaded)
     clearance = clearance_among_spheres(loaded, reference, pairs)
     began = time.perf_counter()
-    step = _controller(clearance, reference).torque
+    density = full_sensing_density(clearance, loaded.configuration(reference.position[-1]))
+    step = DensityTracking(loaded, density, reference, Gains()).torque
     preparation = time.perf_counter() - began
     bare, states = _bare_calls(clearance), _states(loaded, reference)
     first = float(_seconds(step, states[:1], np.empty((2, 1)))[0, 0])
@@ -165,15 +166,19 @@ def _collections() -> int:
     return sum(generation["collections"] for generation in gc.get_stats())
 
 
-def _controller(clearance: Clearance, reference: Reference) -> DensityTracking:
+def full_sensing_density(clearance: Clearance, goal: Array) -> NavigationDensity[TorusDistance]:
+    """Return a density that senses as far as it does by default, wherever the arm is to move.
+
+    Args:
+        clearance: its pairs.
+        goal: configuration (nq,), which a controller that tracks moves.
+    """
     arm, sensing = clearance.arm, SensingParameters()
-    goal_distance = TorusDistance(arm, arm.configuration(reference.position[-1]))
     unsafe: list[UnsafeSet] = [
         NearClearanceSet(NearPairs(SweptBound(clearance)), 0.0, sensing.distance),
         JointLimitSet(arm, sensing.joint),
     ]
-    density = NavigationDensity(unsafe, goal_distance, DensityParameters())
-    return DensityTracking(arm, density, reference, Gains())
+    return NavigationDensity(unsafe, TorusDistance(arm, goal), DensityParameters())
 
 
 def _bare_calls(clearance: Clearance) -> Step:
