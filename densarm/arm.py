@@ -109,6 +109,8 @@ class Arm:
 
     def configurations(self, angles: Array) -> Array:
         """Return the configurations (..., nq) of joint positions (..., nv), without checks."""
+        if not self._circles:
+            return angles.copy()
         q = np.empty((*angles.shape[:-1], self.nq))
         q[..., self.idx_q] = angles
         for joint in self._circles:
@@ -121,6 +123,8 @@ class Arm:
 
         A continuous joint's angle lies in (-pi, pi].
         """
+        if not self._circles:
+            return np.array(q, dtype=np.float64)
         q = np.asarray(q, dtype=np.float64)
         theta = q.take(self.idx_q, axis=-1)
         for joint in self._circles:
@@ -282,18 +286,13 @@ def _with_options(
     folders: Iterable[str | Path],
     base_placement: pin.SE3 | None,
 ) -> RobotDescription:
-    if base_placement is not None and not isinstance(base_placement, pin.SE3):
-        raise InvalidValueError("base_placement", base_placement, "a pinocchio.SE3")
+    if base_placement is not None:
+        if not isinstance(base_placement, pin.SE3):
+            raise InvalidValueError("base_placement", base_placement, "a pinocchio.SE3")
+        pose = tuple(pin.SE3ToXYZQUAT(base_placement).tolist())
+        description = replace(description, base_placement=pose)
     if isinstance(folders, str | Path):
         folders = [folders]
     given = tuple(str(Path(folder).resolve()) for folder in folders)
-    return replace(
-        description,
-        srdf=description.srdf if srdf is None else read_text(Path(srdf)),
-        package_dirs=given + description.package_dirs,
-        base_placement=(
-            description.base_placement
-            if base_placement is None
-            else tuple(pin.SE3ToXYZQUAT(base_placement).tolist())
-        ),
-    )
+    text = description.srdf if srdf is None else read_text(Path(srdf))
+    return replace(description, srdf=text, package_dirs=given + description.package_dirs)

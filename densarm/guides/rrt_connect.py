@@ -96,9 +96,10 @@ class _JointSpace:
 
     def configuration(self, state: ob.State) -> Array:
         """Return the configuration (nq,) of a state."""
-        box = state[0][self._box] if self._box.stop else []
-        values = np.array(box + [state[index].value for index in self._circles])
-        return self._arm.configurations(values.take(self._position))
+        values = state[0][self._box] if self._box.stop else []
+        if self._circles:
+            values += [state[index].value for index in self._circles]
+        return self._arm.configurations(np.array(values).take(self._position))
 
 
 def _box(lower: Array, upper: Array) -> ob.RealVectorStateSpace:

@@ -1,4 +1,4 @@
-"""What the faces of boxes around shapes prove of a pair, the cheapest of planes between bodies."""
+"""Planes on the faces of boxes around shapes, the cheapest of planes between bodies."""
 
 import math
 
@@ -7,54 +7,48 @@ from densarm.compiled import compiled
 
 
 @compiled
-def faces_prove(
-    box: Array,
-    one: int,
-    other: int,
-    pose: Array,
-    pose_a: Array,
-    pose_b: Array,
-    kept: float,
-    half: float,
-    bend: float,
-) -> bool:
-    """Return whether a face of the box around one shape proves the other apart along an arc.
+def best_face(box: Array, one: int, other: int, pose: Array) -> tuple[int, float]:
+    """Return the face of the box around one shape that another is farthest beyond, and how far.
 
     Args:
         box: half the sides of the boxes (S, 3) [m].
-        one: the shape with the face; it moves with the last joint that moves both.
+        one: the shape with the faces.
         other: the other shape.
-        pose: of the shapes in the middle of the arc (S, 12).
-        pose_a: of the shapes at one end (S, 12).
-        pose_b: of the shapes at the other end (S, 12).
-        kept: distance to be kept [m].
-        half: bound on how far they move against each other along half the arc [m].
-        bend: bound on their acceleration against each other along half the arc [m].
+        pose: of the shapes (S, 12).
+
+    Returns:
+        Number of the face: 2 k looks up, 2 k + 1 down along axis k; the gap of the boxes there
+        [m], negative if they may overlap.
     """
-    axis, side, gap = one - one, 1.0, -1.0  # a literal 0 would be compiled for
-    for k in range(3):
-        above = face_gap(box, one, k, 1.0, other, pose)
-        below = face_gap(box, one, k, -1.0, other, pose)
-        if max(above, below) > gap:
-            axis, side, gap = k, 1.0 if above > below else -1.0, max(above, below)
-    gap -= kept
-    if gap > half or not gap > 0.0:
-        return gap > 0.0
-    gap_a = face_gap(box, one, axis, side, other, pose_a) - kept
-    gap_b = face_gap(box, one, axis, side, other, pose_b) - kept
-    return stays_apart(gap, gap_a, bend) and stays_apart(gap, gap_b, bend)
+    face, gap = one - one, -math.inf  # a literal 0 would be compiled for
+    for axis in range(3):
+        offset, extent = _across(box, one, axis, other, pose)
+        if abs(offset) - extent > gap:
+            face, gap = 2 * axis + (1 if offset < 0.0 else 0), abs(offset) - extent
+    return face, gap
 
 
 @compiled
-def face_gap(box: Array, one: int, axis: int, side: float, other: int, pose: Array) -> float:
-    """Return how far the box around another shape is beyond a face of one's box [m]."""
+def face_gap(box: Array, one: int, face: int, other: int, pose: Array) -> float:
+    """Return how far the box around another shape is beyond a face of one's box [m].
+
+    Arguments as for `best_face`.
+    """
+    offset, extent = _across(box, one, face >> 1, other, pose)
+    return (1.0 - 2.0 * (face & 1)) * offset - extent
+
+
+@compiled
+def _across(box: Array, one: int, axis: int, other: int, pose: Array) -> tuple[float, float]:
+    """Return how far apart the middles of two boxes are along an axis of one, and the extents."""
     x, y, z = pose[one, axis], pose[one, 3 + axis], pose[one, 6 + axis]
-    gap: float = x * (pose[other, 9] - pose[one, 9]) + y * (pose[other, 10] - pose[one, 10])
-    gap = side * (gap + z * (pose[other, 11] - pose[one, 11])) - box[one, axis]
+    offset = x * (pose[other, 9] - pose[one, 9]) + y * (pose[other, 10] - pose[one, 10])
+    offset += z * (pose[other, 11] - pose[one, 11])
+    extent = box[one, axis]
     for k in range(3):
         along = x * pose[other, k] + y * pose[other, 3 + k] + z * pose[other, 6 + k]
-        gap -= abs(along) * box[other, k]
-    return gap
+        extent += abs(along) * box[other, k]
+    return offset, extent
 
 
 @compiled

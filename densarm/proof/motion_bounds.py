@@ -16,6 +16,7 @@ def write_motion_bounds(
     joint: NDArray[np.int64],
     ball: Array,
     lever: Array,
+    is_asked: NDArray[np.bool_],
     step: Array,
     share: float,
     joint_pose: Array,
@@ -23,7 +24,7 @@ def write_motion_bounds(
     motion: Array,
     bend: Array,
 ) -> None:
-    r"""Write, for each shape seen from each joint that moves it, bounds on its motion.
+    r"""Write, for shapes seen from each joint that moves them, bounds on their motion.
 
     Let joint positions move at constant rates u_j over a unit of time, and let the point p of a
     shape be seen from the frame of a joint c. Over the joints j between c and the shape,
@@ -41,6 +42,7 @@ def write_motion_bounds(
         joint: that moves each shape (S,).
         ball: radius of a ball around each shape (S,) [m].
         lever: bound on r_j over all configurations (S, nv) [m, 1 for prismatic joints].
+        is_asked: for which shapes the bounds are wanted (S,).
         step: motion of the joints (nv,) [rad or m].
         share: of the motion that is made.
         joint_pose: poses of the joints in the middle of it (njoints, 12 or more).
@@ -49,6 +51,8 @@ def write_motion_bounds(
         bend: the bounds β_c (S, njoints) [m], overwritten alike.
     """
     for shape in range(joint.size):
+        if not is_asked[shape]:
+            continue
         moved = bent = 0.0
         j = joint[shape]
         while j > 0:

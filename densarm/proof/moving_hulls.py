@@ -110,19 +110,21 @@ def place(
     joints: Array,
     joint: NDArray[np.int64],
     frame: Array,
+    is_asked: NDArray[np.bool_],
     angles: Array,
     step: Array,
     share: float,
     joint_pose: Array,
     shape_pose: Array,
 ) -> None:
-    """Write where joints and shapes are after a share of a motion.
+    """Write where joints and some shapes are after a share of a motion.
 
     Args:
         parent: see `MovingHulls`, as the next three.
         joints: the table of joints.
         joint: that moves each shape.
         frame: of each shape.
+        is_asked: which shapes are to be placed (S,).
         angles: joint positions (nv,) [rad or m].
         step: motion of the joints (nv,) [rad or m].
         share: of the motion that was made.
@@ -131,5 +133,5 @@ def place(
     """
     write_joint_poses(parent, joints, angles, step, share, joint_pose)
     for shape in range(joint.size):
-        if joint[shape] > 0:
+        if is_asked[shape] and joint[shape] > 0:
             write_composed(joint_pose, joint[shape], frame, shape, shape_pose)

@@ -6,7 +6,12 @@ from numpy.typing import NDArray
 from densarm.arrays import Array
 from densarm.clearance import DISTANCE_TOLERANCE
 from densarm.compiled import compiled
-from densarm.proof.arc_proof import append_unproved, keep_unproved
+from densarm.proof.arc_proof import (
+    append_unproved,
+    keep_unproved_at_ends,
+    keep_unproved_by_faces,
+    keep_unproved_by_planes,
+)
 from densarm.proof.motion_bounds import write_motion_bounds
 from densarm.proof.moving_hulls import moving_hulls, place
 from densarm.proof.swept_bound import SweptBound
@@ -73,11 +78,7 @@ class SeparatingPlanes:
     def _is_clear(self, angles: Array, step: Array, kept: Array) -> bool:
         self._clearance.require_version(self._version)
         state = self._corners, self._order
-        motion = kept, angles, step
-        return bool(
-            _segment_is_clear(*self._bodies, *state, 0, _FIRST, *motion)
-            and _segment_is_clear(*self._bodies, *state, _FIRST, len(self._order), *motion)
-        )
+        return bool(_segment_is_clear(*self._bodies, *state, kept, angles, step))
 
 
 @compiled
@@ -96,40 +97,125 @@ def _segment_is_clear(
     lever: Array,
     corners: NDArray[np.int64],
     order: NDArray[np.int64],
-    first: int,
-    last: int,
     kept: Array,
     angles: Array,
     step: Array,
 ) -> bool:
-    """Prove some pairs; arcs on which one is not proved are halved, all of a length in turn."""
-    joint_pose, joint_a = np.empty((parent.size, 12)), np.empty((parent.size, 12))
-    joint_b, pose, pose_a, pose_b = joint_a.copy(), frame.copy(), frame.copy(), frame.copy()
-    motion, bend = np.empty((joint.size, parent.size)), np.empty((joint.size, parent.size))
-    count, share, longest = max(0, min(last, order.size) - first), 1.0, 0.0
-    none = count - count  # functions that take a literal 0 are compiled for it, and again
-    pairs_on_arcs = np.empty((count, 2), np.int64)
-    for n in range(count):
-        pairs_on_arcs[n, 0], pairs_on_arcs[n, 1] = order[first + n], 0
+    """Prove all pairs, those first that were not clear lately."""
+    joint_poses, poses = np.empty((3, parent.size, 12)), np.empty((3, joint.size, 12))
+    for k in range(poses.size):  # entry by entry: a slice compiles for seconds
+        poses.flat[k] = frame.flat[k % frame.size]
+    bounds, is_asked = np.empty((2, joint.size, parent.size)), np.empty(joint.size, np.bool_)
+    longest = 0.0
     for rate in step:
         longest = max(longest, abs(rate))
-    while True:
-        planes, halves = np.empty((count, 4)), np.empty((2 * count, 2), np.int64)
-        begin = waiting = none
-        while begin < count:
-            arc, end = pairs_on_arcs[begin, 1], begin + 1
-            while end < count and pairs_on_arcs[end, 1] == arc:
-                end += 1
-            at = arc * share
-            place(parent, joints, joint, frame, angles, step, at, joint_a, pose_a)
-            place(parent, joints, joint, frame, angles, step, at + 0.5 * share, joint_pose, pose)
-            place(parent, joints, joint, frame, angles, step, at + share, joint_b, pose_b)
-            write_motion_bounds(
-                parent, joints, joint, ball, lever, step, share, joint_pose, pose, motion, bend
-            )
-            unproved = keep_unproved(
+    first = min(_FIRST, order.size)
+    for begin, end in ((0, first), (first, order.size)):
+        waiting = _unproved(order, begin, end)
+        share = 1.0
+        while waiting.shape[0] > 0:
+            waiting, is_clear = _halves(
+                parent,
+                joints,
                 joint,
+                frame,
                 box,
+                ball,
+                points,
+                neighbours,
+                first_neighbour,
+                radius,
+                pairs,
+                lever,
+                corners,
+                order,
+                kept,
+                angles,
+                step,
+                waiting,
+                share,
+                joint_poses,
+                poses,
+                bounds,
+                is_asked,
+            )
+            if not is_clear or (waiting.shape[0] > 0 and longest * share <= _FLOOR):
+                return False
+            share *= 0.5
+    return True
+
+
+@compiled
+def _unproved(order: NDArray[np.int64], begin: int, end: int) -> NDArray[np.int64]:
+    """Return a table of pairs that are not proved on the whole segment."""
+    waiting = np.empty((end - begin, 3), np.int64)
+    for n in range(begin, end):
+        waiting[n - begin, 0], waiting[n - begin, 1] = order[n], 0
+    return waiting
+
+
+@compiled
+def _halves(
+    parent: NDArray[np.int64],
+    joints: Array,
+    joint: NDArray[np.int64],
+    frame: Array,
+    box: Array,
+    ball: Array,
+    points: Array,
+    neighbours: NDArray[np.int64],
+    first_neighbour: NDArray[np.int64],
+    radius: Array,
+    pairs: NDArray[np.int64],
+    lever: Array,
+    corners: NDArray[np.int64],
+    order: NDArray[np.int64],
+    kept: Array,
+    angles: Array,
+    step: Array,
+    waiting: NDArray[np.int64],
+    share: float,
+    joint_poses: Array,
+    poses: Array,
+    bounds: Array,
+    is_asked: NDArray[np.bool_],
+) -> tuple[NDArray[np.int64], bool]:
+    """Return pairs and halves of arcs that are left to prove, and False if a pair is not clear.
+
+    The joints' and shapes' poses and their bounds, written here, are of one arc at a time: at its
+    beginning, in its middle, and at its end.
+    """
+    count = waiting.shape[0]
+    planes, halves = np.empty((count, 4)), np.empty((2 * count, 3), np.int64)
+    motion, bend = bounds[0], bounds[1]
+    begin = written = count - count  # functions that take a literal 0 are compiled for it too
+    while begin < count:
+        arc, end = waiting[begin, 1], begin + 1
+        while end < count and waiting[end, 1] == arc:
+            end += 1
+        _ask_for(pairs, waiting, begin, end, is_asked)
+        at = share * (arc + 0.5)
+        place(parent, joints, joint, frame, is_asked, angles, step, at, joint_poses[1], poses[1])
+        write_motion_bounds(
+            parent,
+            joints,
+            joint,
+            ball,
+            lever,
+            is_asked,
+            step,
+            share,
+            joint_poses[1],
+            poses[1],
+            motion,
+            bend,
+        )
+        left = keep_unproved_by_faces(
+            joint, box, pairs, kept, poses[1], motion, waiting, begin, end, planes
+        )
+        # Pairs that no face is between first, for one of them may be in contact.
+        for faces_are_done in range(2):
+            left = keep_unproved_by_planes(
                 points,
                 neighbours,
                 first_neighbour,
@@ -138,43 +224,70 @@ def _segment_is_clear(
                 kept,
                 corners,
                 order,
-                pose,
-                pose_a,
-                pose_b,
+                poses[1],
                 motion,
-                bend,
-                pairs_on_arcs,
+                waiting,
                 begin,
-                end,
+                left,
                 planes,
             )
-            if unproved < 0:
-                return False
-            for side in range(2):
-                joint_end, pose_end = (joint_a, pose_a) if side == 0 else (joint_b, pose_b)
-                waiting = append_unproved(
-                    points,
-                    neighbours,
-                    first_neighbour,
-                    radius,
-                    pairs,
-                    kept,
-                    corners,
-                    joint_pose,
-                    joint_end,
-                    pose_end,
-                    bend,
-                    pairs_on_arcs,
-                    begin,
-                    unproved,
-                    planes,
-                    2 * arc + side,
-                    halves,
-                    waiting,
+            if left < 0:
+                return halves, False
+            if faces_are_done or left == begin:
+                break
+            _ask_for(pairs, waiting, begin, left, is_asked)
+            for side in (0, 2):
+                at = share * (arc + 0.5 * side)
+                place(
+                    parent,
+                    joints,
+                    joint,
+                    frame,
+                    is_asked,
+                    angles,
+                    step,
+                    at,
+                    joint_poses[side],
+                    poses[side],
                 )
-            begin = end
-        if waiting == 0:
-            return True
-        if longest * share <= _FLOOR:
-            return False
-        pairs_on_arcs, count, share = halves, waiting, 0.5 * share
+            left = keep_unproved_at_ends(
+                box, pairs, kept, poses[0], poses[2], bend, waiting, begin, left, planes
+            )
+        for side in (0, 2):
+            written = append_unproved(
+                points,
+                neighbours,
+                first_neighbour,
+                radius,
+                pairs,
+                kept,
+                corners,
+                joint_poses[1],
+                joint_poses[side],
+                poses[side],
+                bend,
+                waiting,
+                begin,
+                left,
+                planes,
+                2 * arc + side // 2,
+                halves,
+                written,
+            )
+        begin = end
+    return halves[:written], True
+
+
+@compiled
+def _ask_for(
+    pairs: NDArray[np.int64],
+    waiting: NDArray[np.int64],
+    begin: int,
+    end: int,
+    is_asked: NDArray[np.bool_],
+) -> None:
+    """Write which shapes are of the pairs in some rows of a table."""
+    for shape in range(is_asked.size):
+        is_asked[shape] = False
+    for n in range(begin, end):
+        is_asked[pairs[waiting[n, 0], 0]] = is_asked[pairs[waiting[n, 0], 1]] = True

@@ -46,7 +46,7 @@ def test_what_follows_planning_is_compiled_without_planning():
         "from densarm.visualization.rasterizer import _fill\n"
         "from densarm.proof.separation import separation\n"
         "assert write_torque.signatures and _fill.signatures and separation.signatures\n"
-        "assert not any(m.endswith('arc_proof') and sys.modules[m].keep_unproved.signatures\n"
+        "assert not any(m.endswith('arc_proof') and sys.modules[m].append_unproved.signatures\n"
         "               for m in list(sys.modules))\n"
     )
     subprocess.run([sys.executable, "-c", code], check=True)

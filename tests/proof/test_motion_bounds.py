@@ -35,10 +35,11 @@ def bounds(clearance: Clearance, angles, step) -> tuple[np.ndarray, np.ndarray]:
     """Bounds on the motion from joint positions by a step, of each shape seen from each joint."""
     bodies, _ = moving_hulls(clearance)
     joints, shapes = bodies.joints.copy(), bodies.frame.copy()
-    place(*bodies[:4], angles, step, 0.5, joints, shapes)
+    asked = np.ones(len(bodies.joint), dtype=bool)
+    place(*bodies[:4], asked, angles, step, 0.5, joints, shapes)
     motion, bend = np.full((2, len(bodies.joint), len(bodies.parent)), np.nan)
     lever = SweptBound(clearance).shape_lever
-    chain = bodies.parent, bodies.joints, bodies.joint, bodies.ball, lever
+    chain = bodies.parent, bodies.joints, bodies.joint, bodies.ball, lever, asked
     write_motion_bounds(*chain, step, 1.0, joints, shapes, motion, bend)
     return motion, bend
 
