@@ -1,5 +1,6 @@
 """MotionPlan: from a guide's sub-goals to what a controller follows."""
 
+import math
 import time
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -27,8 +28,9 @@ from densarm.simulation.fixed_step_loop import REACHED_POSITION
 _LIMIT_INSET = 0.2 * REACHED_POSITION
 """Distance from position limits that the motion leaves and reaches its ends at [rad or m]."""
 
-_ROOM_SHARES = (1.0, 0.2)
-"""Shares of the path margin, tried in turn: a narrow passage may leave less room than it wants."""
+_ATTEMPTS = ((1.0, 0.025), (0.25, 1.0), (0.05, 1.0))
+"""Shares of the path margin and of the planner's iterations, tried in turn: most spaces are wide,
+and a narrow passage may leave less room than wanted."""
 
 _END_SHARE = 0.5
 """Share of the clearance at start and goal that a path's margin may take."""
@@ -86,16 +88,17 @@ def plan_motion(
     bound = SweptBound(clearance, control.margin)
     depart, arrive = (_inside_limits(bound, q) for q in (start, goal))
     ends = min(bound.slack(q).min(initial=np.inf) for q in (start, depart, arrive))
-    room = max(0.0, min(control.path_margin, _END_SHARE * ends))
+    room = max(0.0, _END_SHARE * ends)
     began = time.perf_counter()
-    margins = list(dict.fromkeys(control.margin + share * room for share in _ROOM_SHARES))
-    for margin in margins:
-        path_bound = bound.with_margin(margin)
-        path = _chosen(guide, scenario, path_bound).plan(depart, arrive, scenario.seed)
+    # Of attempts with the same margin the last counts, which is the most thorough.
+    attempts = {min(share * control.path_margin, room): effort for share, effort in _ATTEMPTS}
+    for margin, effort in attempts.items():
+        path_bound = bound.with_margin(control.margin + margin)
+        path = _chosen(guide, scenario, path_bound, effort).plan(depart, arrive, scenario.seed)
         if isinstance(path, GuidePath):
             break
     if isinstance(path, NoPath):
-        tried = " and ".join(f"{1e3 * margin:.3g}" for margin in margins)
+        tried = ", ".join(f"{1e3 * (control.margin + margin):.3g}" for margin in attempts)
         return NoPath(f"{path.reason}, with margins of {tried} mm")
     plan = MotionPlan(scenario, path, bound, guide_time=time.perf_counter() - began)
     if control.form != ControlForm.TRACKING:
@@ -122,11 +125,17 @@ def _curve(plan: MotionPlan) -> Array:
     return PlanningSystem(plan.guided, plan.bound).integrate(path.waypoints[0]).q
 
 
-def _chosen(guide: Guide | GuideKind, scenario: Scenario, bound: SweptBound) -> Guide:
+def _chosen(
+    guide: Guide | GuideKind, scenario: Scenario, bound: SweptBound, effort: float
+) -> Guide:
+    """Return a guide, which spends that share of its iterations if it searches."""
     if guide == GuideKind.DIRECT:
         return DirectGuide()
     if guide == GuideKind.PATH:
-        return PathGuide(scenario.arm, SeparatingPlanes(bound), scenario.planning)
+        iterations = math.ceil(effort * scenario.planning.iterations)
+        searches = scenario.planning.searches if effort == 1.0 else 1
+        planning = replace(scenario.planning, iterations=iterations, searches=searches)
+        return PathGuide(scenario.arm, SeparatingPlanes(bound), planning)
     return guide
 
 

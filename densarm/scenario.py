@@ -67,8 +67,8 @@ class ControlParameters:
     """The guide, unless the caller names another."""
     margin: float = 0.0
     """Safety margin m: a pair is unsafe at this distance and below [m]."""
-    path_margin: float = 0.005
-    """Distance that paths keep beyond m where start and goal leave so much [m]."""
+    path_margin: float = 0.02
+    """Distance that paths keep beyond m, less in narrow spaces and near start and goal [m]."""
     kappa: float = 1.0
     """κ of the goal distance, between product and sum; the plain form has the sum."""
 

@@ -1,6 +1,7 @@
 """Plans: what each controller form needs, and why there is none."""
 
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -45,6 +46,26 @@ def test_goal_at_the_start_is_a_reference_at_rest(swing_up):
 def test_goal_out_of_reach_is_no_path(fenced_in):
     plan = planned(fenced_in)
     assert isinstance(plan, NoPath)
+
+
+def keeps(plan, margin) -> bool:
+    bound = plan.bound.with_margin(margin)
+    return all(bound.segment_is_clear(a, b) for a, b in pairwise(plan.path.waypoints))
+
+
+@pytest.mark.parametrize("name", ["panda_shelf", "ur5_bin"])
+def test_a_path_keeps_the_margin_where_there_is_room(name):
+    plan = planned(load_scenario(name))
+    room = 0.5 * min(plan.bound.slack(q).min() for q in plan.path.waypoints[[0, -1]])
+    assert room > 0.01
+    assert keeps(plan, min(plan.scenario.control.path_margin, room) - 1e-6)
+
+
+def test_a_narrow_passage_is_passed_with_less():
+    plan = planned(load_scenario("three_link_gate"))
+    wanted = plan.scenario.control.path_margin
+    assert keeps(plan, 0.25 * wanted - 1e-6)
+    assert not keeps(plan, wanted)
 
 
 def test_an_arm_too_weak_is_infeasible(swing_up):

@@ -28,6 +28,7 @@ SCALES = (1.0, 0.2, 5.0)
 """Multiples of the default of its main parameter that tuning tries on every method."""
 
 _TUNING_SEED = 1_000_003  # added to the seed of the starts that are not tuned on
+_ROOM = 0.005  # [m], that random starts keep beyond the margin
 
 
 @dataclass(frozen=True)
@@ -177,7 +178,7 @@ def compare(
             raise UnknownNameError("method", name, METHODS)
     scenario = _with_equal_limits(scenario, seed)
     clearance, seed = Clearance(scenario.arm, scenario.scene), scenario.seed
-    room = scenario.control.margin + scenario.control.path_margin
+    room = scenario.control.margin + _ROOM
     others = clear_configurations(clearance, positive_integer("starts", starts) - 1, seed, room)
     tuning = clear_configurations(
         clearance,
