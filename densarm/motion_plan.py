@@ -59,9 +59,8 @@ class MotionPlan:
         """The density along the sub-goals."""
         scenario = self.scenario
         return GuidedDensity(
-            self.bound.clearance,
+            self.bound,
             SubGoalChain(self.bound, self.path, scenario.sensing),
-            scenario.control.margin,
             scenario.density,
             _goal_distance(scenario),
         )

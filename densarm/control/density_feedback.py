@@ -49,5 +49,4 @@ class DensityFeedback:
         metric = self._metric * self._dynamics.mass_matrix()
         attract = self._gain * self._field.update(q, metric)
         wanted = self._dynamics.torque(-self._gain * v, attract)
-        distance = self._field.clearance.distance
-        return self._guard.torque(t, self._dynamics, q, v, wanted, distance)
+        return self._guard.torque(t, self._dynamics, q, v, wanted, self._field.distances)

@@ -43,5 +43,4 @@ class FieldRegulation:
         attract = self._gain * self._field.update(q)
         self._dynamics.update(q, v)
         wanted = self._dynamics.torque(-self._gain * v, attract)
-        distance = self._field.clearance.distance
-        return self._guard.torque(t, self._dynamics, q, v, wanted, distance)
+        return self._guard.torque(t, self._dynamics, q, v, wanted, self._field.distances)

@@ -8,6 +8,7 @@ from densarm.arrays import Array
 from densarm.control.gains import Gains
 from densarm.control.inverse_dynamics import InverseDynamics
 from densarm.control.jerk_limit import JerkLimit
+from densarm.density.distance_bounds import DistanceBounds
 from densarm.fields.speed_law import SpeedLaw
 from densarm.proof.straight_brake import StraightBrake
 
@@ -41,7 +42,7 @@ class StoppingGuard:
         q: Array,
         v: Array,
         wanted: Array,
-        distance: Array,
+        distances: DistanceBounds,
     ) -> Array:
         """Return the wanted torque (nv,) [N·m or N] as far as the jerk allows, or the brake's.
 
@@ -51,7 +52,7 @@ class StoppingGuard:
             q: configuration (nq,).
             v: velocity (nv,) [rad/s or m/s].
             wanted: torque that is asked for (nv,) [N·m or N].
-            distance: signed distances of all pairs at q (K,) [m].
+            distances: of all pairs at q.
         """
         a, tau = self._acceleration(q, v, wanted), wanted
         limited = self._jerk.limited(t, a)
@@ -61,7 +62,7 @@ class StoppingGuard:
         v_next = v + self._period * a
         motion = self._period * np.maximum(np.abs(v), np.abs(v_next))
         q_next = self._arm.integrate(q, self._period * v_next)
-        if not self._speed_law.can_stop(q_next, v_next, distance, motion):
+        if not self._speed_law.can_stop(q_next, v_next, distances, motion):
             tau = dynamics.brake_torque(v, self._brake.duration(q, v), self._period)
             a = self._acceleration(q, v, tau)
         self._jerk.last = a

@@ -33,7 +33,8 @@ class NearPairs:
     reach. All pairs wake while a slide is beyond its limits, where the levers do not hold; pairs
     of an obstacle wake when it is moved.
 
-    Queried distances do not depend on what was queried before, to the last bit.
+    Queried distances do not depend on what was queried before, to the last bit. These are
+    `DistanceBounds`: a sleeping pair can be woken by asking for its distance.
 
     Args:
         bound: the pairs and r_kj.
@@ -78,6 +79,8 @@ class NearPairs:
         # After the joints have gone a way s a pair is at least level - lever @ s apart.
         self._level = self._pair_numbers[1]
         # Rows: the way gone, its last step, and the least and largest position of slides.
+        self._bounds: Array | None = None
+        self._is_placed = False
         self._joint_numbers = np.zeros((4, arm.nv))
         self._joint_numbers[2] = np.where(bound.slides, arm.limits.lower, -np.inf)
         self._joint_numbers[3] = np.where(bound.slides, arm.limits.upper, np.inf)
@@ -96,9 +99,27 @@ class NearPairs:
     @property
     def distance(self) -> Array:
         """Distances at the last update (K,) [m]: exact for pairs awake, else lower bounds."""
-        gone = self._lever @ self._joint_numbers[0]
-        asleep = self._level - gone - DISTANCE_TOLERANCE
-        return np.where(self.state == _ASLEEP, asleep, self.rows[:, 0])
+        if self._bounds is None:
+            gone = self._lever @ self._joint_numbers[0]
+            asleep = self._level - gone - DISTANCE_TOLERANCE
+            self._bounds = np.where(self.state == _ASLEEP, asleep, self.rows[:, 0])
+        return self._bounds
+
+    def query(self, pair: int) -> bool:
+        """Act as `DistanceBounds.query`, at the configuration of the last update."""
+        if self.state[pair] == _AWAKE:
+            return False
+        geometry, data = self._geometry, self._geometry_data
+        if not self._is_placed:
+            pin.updateGeometryPlacements(self._model, self.data, geometry, data)
+            self._is_placed = True
+        data.activateCollisionPair(pair)
+        pin.computeDistance(geometry, data, pair)
+        if not self._view.is_direct:
+            self._view.read()
+        self.state[pair] = _AWAKE
+        self.distance[pair] = self.rows[pair, 0]
+        return True
 
     def wake_all(self) -> None:
         """Query every pair at the next update."""
@@ -113,6 +134,7 @@ class NearPairs:
         """
         geometry, data = self._geometry, self._geometry_data
         n_awake, n_changed = _wake(q, margin, *self._arrays)
+        self._bounds, self._is_placed = None, n_awake > 0
         for k in self._pair_states[2, :n_changed].tolist() if n_changed else ():
             if k >= 0:
                 data.activateCollisionPair(k)

@@ -6,7 +6,7 @@ import daqp
 import numpy as np
 
 from densarm.arrays import Array
-from densarm.clearance import Clearance
+from densarm.density.distance_bounds import DistanceBounds, ExactDistances
 from densarm.density.goal_distance import GoalDistance
 from densarm.fields.barriers import Barriers
 from densarm.fields.speed_law import SpeedLaw
@@ -81,9 +81,9 @@ class BarrierFilter:
         self._hessian = np.diag(np.append(np.ones(arm.nv), parameters.relaxation))
 
     @property
-    def clearance(self) -> Clearance:
-        """As `VelocityField.clearance`."""
-        return self.barriers.clearance
+    def distances(self) -> DistanceBounds:
+        """As `VelocityField.distances`."""
+        return ExactDistances(self.barriers.clearance.distance)
 
     def update(self, q: Array) -> Array:
         """Return k (nv,) at q (nq,) [rad/s or m/s]; zero where no velocity keeps every row."""
@@ -94,7 +94,7 @@ class BarrierFilter:
             return np.zeros_like(self._slope)
         velocity = self._filter(self._nominal(), value / steepness, self._slope / steepness)
         way_left = float(np.linalg.norm(self.goal_distance.error(q)))
-        return self.speed_law.limit(q, velocity, self.clearance.distance, way_left)
+        return self.speed_law.limit(q, velocity, self.distances, way_left)
 
     def _nominal(self) -> Array:
         velocity = -self._rate * self._slope

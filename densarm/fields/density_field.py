@@ -3,7 +3,7 @@
 import numpy as np
 
 from densarm.arrays import Array
-from densarm.clearance import Clearance
+from densarm.density.distance_bounds import DistanceBounds
 from densarm.fields.guided_density import GuidedDensity
 from densarm.fields.speed_law import SpeedLaw
 
@@ -33,12 +33,12 @@ class DensityField:
         self.guided = guided
         self.speed_law = speed_law
         self._rate = rate
-        self._gradient = np.zeros(guided.clearance.arm.nv)
+        self._gradient = np.zeros(guided.arm.nv)
 
     @property
-    def clearance(self) -> Clearance:
-        """As `VelocityField.clearance`."""
-        return self.guided.clearance
+    def distances(self) -> DistanceBounds:
+        """As `VelocityField.distances`."""
+        return self.guided.distances
 
     def update(self, q: Array, metric: Array | None = None) -> Array:
         """Return k(q) and move on along the sub-goals.
@@ -60,4 +60,4 @@ class DensityField:
         velocity = self._rate * pull * self._gradient
         if metric is not None:
             velocity = np.asarray(np.linalg.solve(metric, velocity), dtype=np.float64)
-        return self.speed_law.limit(q, velocity, self.clearance.distance, to_sub_goal + beyond)
+        return self.speed_law.limit(q, velocity, self.distances, to_sub_goal + beyond)

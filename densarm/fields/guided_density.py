@@ -3,17 +3,19 @@
 import numpy as np
 
 from densarm.arrays import Array
-from densarm.clearance import Clearance
 from densarm.density import (
-    ClearanceSet,
     DensityParameters,
     Gauge,
     GoalDistance,
     JointLimitSet,
     NavigationDensity,
+    NearClearanceSet,
+    NearPairs,
 )
+from densarm.density.distance_bounds import DistanceBounds
 from densarm.fields.stall import find_stall
 from densarm.fields.sub_goal_chain import SubGoalChain
+from densarm.proof.swept_bound import SweptBound
 
 CRITICAL_SLOPE = 1e-9
 """‖∇ ln ρ‖ [1/rad] at and below which a point counts as critical."""
@@ -23,9 +25,8 @@ class GuidedDensity:
     """The density whose goal is the current sub-goal, and whose sensing regions fit the way to it.
 
     Args:
-        clearance: distances to the obstacles and of the arm to itself.
+        bound: distances to the obstacles and of the arm to itself, and the safety margin.
         chain: the sub-goals.
-        margin: safety margin m of the unsafe sets [m].
         parameters: of the density.
         goal_distance: V, whose goal is moved along the sub-goals.
 
@@ -34,18 +35,20 @@ class GuidedDensity:
 
     def __init__(
         self,
-        clearance: Clearance,
+        bound: SweptBound,
         chain: SubGoalChain,
-        margin: float,
         parameters: DensityParameters,
         goal_distance: GoalDistance,
     ) -> None:
-        arm = clearance.arm
+        self.arm = arm = bound.arm
         self.chain = chain
-        self.clearance = clearance
-        self._version = clearance.version
+        self._clearance = bound.clearance
+        self._version = bound.clearance.version
         self._log_gradient = np.zeros(arm.nv)
-        self._clearance_set = ClearanceSet(clearance, margin, chain.sensing_distance[1])
+        pairs = NearPairs(bound)
+        self.distances: DistanceBounds = pairs
+        """Distances of all pairs at the last update."""
+        self._clearance_set = NearClearanceSet(pairs, bound.margin, chain.sensing_distance[1])
         self.goal_distance = goal_distance
         self.density = NavigationDensity(
             [self._clearance_set, JointLimitSet(arm, chain.joint_sensing_distance)],
@@ -65,9 +68,9 @@ class GuidedDensity:
         Raises:
             SceneChangedError: obstacles have changed since the sub-goals were proved.
         """
-        self.clearance.require_version(self._version)
+        self._clearance.require_version(self._version)
         self.density.update(q)
-        if self.chain.advance(q, self.clearance.distance):
+        if self.chain.advance(q, self.distances):
             self._point_at_sub_goal()
             self.density.update(q)
 
@@ -77,9 +80,7 @@ class GuidedDensity:
         There ρ depends on V alone, and grows along the segment.
         """
         chain = self.chain
-        if self.density.log_psi < 0.0 or not chain.is_in_sight(
-            chain.current, q, self.clearance.distance
-        ):
+        if self.density.log_psi < 0.0 or not chain.is_in_sight(chain.current, q, self.distances):
             return None
         return np.asarray(chain.q[chain.current])
 

@@ -5,7 +5,7 @@ from typing import Protocol
 import numpy as np
 
 from densarm.arrays import Array
-from densarm.clearance import Clearance
+from densarm.density.distance_bounds import DistanceBounds, ExactDistances
 from densarm.density.goal_distance import GoalDistance
 from densarm.fields.barriers import Barriers
 from densarm.fields.speed_law import SpeedLaw
@@ -50,12 +50,12 @@ class PotentialAscent:
         self._rate = rate
 
     @property
-    def clearance(self) -> Clearance:
-        """As `VelocityField.clearance`."""
-        return self.potential.barriers.clearance
+    def distances(self) -> DistanceBounds:
+        """As `VelocityField.distances`."""
+        return ExactDistances(self.potential.barriers.clearance.distance)
 
     def update(self, q: Array) -> Array:
         """Act as `VelocityField.update`."""
         velocity = self._rate * self.potential.direction(q)
         way_left = float(np.linalg.norm(self.potential.goal_distance.error(q)))
-        return self.speed_law.limit(q, velocity, self.clearance.distance, way_left)
+        return self.speed_law.limit(q, velocity, self.distances, way_left)

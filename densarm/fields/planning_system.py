@@ -6,6 +6,7 @@ import numpy as np
 
 from densarm.arrays import Array
 from densarm.density import Gauge
+from densarm.density.distance_bounds import least_room
 from densarm.fields.guided_density import GuidedDensity
 from densarm.proof.swept_bound import SweptBound
 
@@ -90,10 +91,8 @@ class PlanningSystem:
         return None
 
     def _clear_length(self, direction: Array) -> float:
-        room = self._guided.clearance.distance - self._bound.margin
         rate = self._bound.motion(direction)
-        moving = rate > 0.0
-        return float((self.CLEARANCE_SHARE * room[moving] / rate[moving]).min(initial=np.inf))
+        return self.CLEARANCE_SHARE * least_room(self._guided.distances, self._bound.margin, rate)
 
     def _log_density(self) -> float:
         density = self._density

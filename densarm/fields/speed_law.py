@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from densarm.arrays import Array
-from densarm.compiled import compiled
+from densarm.density.distance_bounds import DistanceBounds, all_exceed, least_room
 from densarm.errors import InvalidValueError
 from densarm.proof.straight_brake import StraightBrake
 from densarm.proof.swept_bound import SweptBound
@@ -58,20 +58,23 @@ class SpeedLaw:
         self._parameters = parameters
         self._brake = StraightBrake(bound.arm)
 
-    def speed(self, q: Array, direction: Array, distance: Array, way_left: float) -> float:
+    def speed(
+        self, q: Array, direction: Array, distances: DistanceBounds, way_left: float
+    ) -> float:
         """Return the speed s [rad/s]; zero where no brake is within the limits.
 
         Args:
             q: configuration (nq,).
             direction: unit vector u (nv,).
-            distance: signed distances of all pairs (K,) [m].
+            distances: of all pairs at q.
             way_left: length ℓ of the way to the goal [rad].
         """
-        limits = self._arm.limits
-        fastest, room = _fastest(
-            direction, distance, self._margin, self._lever, self._velocity_limit, way_left
-        )
-        deceleration = 1.0 / float((np.abs(direction) / limits.acceleration).max())
+        turn = np.abs(direction)
+        slowness = float((turn / self._velocity_limit).max())
+        fastest = 1.0 / slowness if slowness > 0.0 else np.inf
+        room = least_room(distances, self._margin, self._lever @ turn, enough=way_left)
+        room = min(max(room, 0.0), way_left)
+        deceleration = 1.0 / float((turn / self._arm.limits.acceleration).max())
         share = self._parameters.braking_share
         speed = min(fastest, math.sqrt(2.0 * share * deceleration * room))
         if not 0.0 < speed < np.inf:
@@ -83,27 +86,27 @@ class SpeedLaw:
             speed *= 0.5
         return min(speed, math.sqrt(2.0 * share * (speed / duration) * room))
 
-    def limit(self, q: Array, velocity: Array, distance: Array, way_left: float) -> Array:
+    def limit(self, q: Array, velocity: Array, distances: DistanceBounds, way_left: float) -> Array:
         """Return a velocity (nv,), shortened to the speed s along it where it is faster.
 
         Args:
             q: configuration (nq,).
             velocity: shape (nv,) [rad/s or m/s].
-            distance: signed distances of all pairs (K,) [m].
+            distances: of all pairs at q.
             way_left: length ℓ of the way to the goal [rad].
         """
         norm = float(np.hypot.reduce(velocity))  # of entries as large as 1e200
         if norm == 0.0:
             return velocity
-        return velocity * min(1.0, self.speed(q, velocity / norm, distance, way_left) / norm)
+        return velocity * min(1.0, self.speed(q, velocity / norm, distances, way_left) / norm)
 
-    def can_stop(self, q: Array, v: Array, distance: Array, motion: Array) -> bool:
+    def can_stop(self, q: Array, v: Array, distances: DistanceBounds, motion: Array) -> bool:
         """Return whether the straight brake is proved to end in free space, inside all limits.
 
         Args:
             q: configuration (nq,).
             v: velocity (nv,) [rad/s or m/s].
-            distance: signed distances of all pairs (K,) [m], known before the arm came to q.
+            distances: of all pairs, from where the arm came to q.
             motion: bound on the motion of each joint since then (nv,) [rad or m].
         """
         duration = self._brake.duration(q, v)
@@ -112,27 +115,5 @@ class SpeedLaw:
         end, limits = self._arm.angles(q) + 0.5 * duration * v, self._arm.limits
         outward = ((end > limits.upper) & (v > 0.0)) | ((end < limits.lower) & (v < 0.0))
         used = self._lever @ (motion + 0.5 * duration * np.abs(v))
-        return not outward.any() and bool(((used < distance - self._margin) | (used == 0.0)).all())
-
-
-@compiled
-def _fastest(
-    direction: Array,
-    distance: Array,
-    margin: float,
-    lever: Array,
-    velocity_limit: Array,
-    way_left: float,
-) -> tuple[float, float]:
-    """Return the speed that the velocity limits allow, and the room along the direction [rad]."""
-    speed, room = np.inf, way_left
-    for j in range(direction.shape[0]):
-        if direction[j] != 0.0:
-            speed = min(speed, velocity_limit[j] / abs(direction[j]))
-    for k in range(distance.shape[0]):
-        rate = 0.0
-        for j in range(direction.shape[0]):
-            rate += lever[k, j] * abs(direction[j])
-        if rate > 0.0:
-            room = min(room, max(distance[k] - margin, 0.0) / rate)
-    return speed, room
+        need = np.where(used > 0.0, self._margin + used, -np.inf)
+        return not outward.any() and all_exceed(distances, need)

@@ -7,7 +7,7 @@ import numpy as np
 
 from densarm.arm import Arm
 from densarm.arrays import Array
-from densarm.density import ClearanceSet, Gauge, GoalDistance, NavigationDensity
+from densarm.density import Gauge, GoalDistance, NavigationDensity, NearClearanceSet
 from densarm.density.inverse_bump import log_inverse_bump
 from densarm.fields.critical_point import CriticalKind, CriticalPoint, find_critical_point
 
@@ -51,7 +51,10 @@ _PHRASES = {
 
 
 def find_stall(
-    density: NavigationDensity[GoalDistance], clearance_set: ClearanceSet, limits: Array, q: Array
+    density: NavigationDensity[GoalDistance],
+    clearance_set: NearClearanceSet,
+    limits: Array,
+    q: Array,
 ) -> Stall:
     """Return why a density leads nowhere from a configuration.
 
@@ -64,11 +67,13 @@ def find_stall(
         limits: sensing distances of its joint limits (nv,) [rad or m].
         q: configuration (nq,).
     """
-    arm = clearance_set.clearance.arm
+    clearance = clearance_set.pairs.clearance
+    arm = clearance.arm
     point = find_critical_point(
         _Around(density, arm, q), np.zeros(arm.nv), iterations=_SEARCH_STEPS
     )
     density.update(q)
+    clearance.update(q)
     gradient = np.empty(arm.nv)
     density.write_gradient(Gauge.LOG, gradient)
     pull = _pull(density)
@@ -109,13 +114,13 @@ def _pull(density: NavigationDensity[GoalDistance]) -> Array:
 
 def _opposing(
     density: NavigationDensity[GoalDistance],
-    clearance_set: ClearanceSet,
+    clearance_set: NearClearanceSet,
     limits: Array,
     q: Array,
     pull: Array,
 ) -> Iterator[tuple[float, str]]:
     """Yield how strongly each bump opposes the pull at the last update, where it does; its name."""
-    theta, clearance = density.parameters.theta, clearance_set.clearance
+    theta, clearance = density.parameters.theta, clearance_set.pairs.clearance
     for k, width in enumerate(clearance_set.sensing_distance):
         h = clearance.distance[k] - clearance_set.margin
         _, slope = log_inverse_bump(h, width, theta)

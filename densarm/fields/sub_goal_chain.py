@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from densarm.arrays import Array
+from densarm.density.distance_bounds import DistanceBounds, all_exceed
 from densarm.errors import InvalidValueError
 from densarm.guides.guide import GuidePath
 from densarm.proof.swept_bound import SweptBound
@@ -96,35 +97,35 @@ class SubGoalChain:
         """Whether the current sub-goal is the goal."""
         return self.current == len(self.q) - 1
 
-    def advance(self, q: Array, distance: Array) -> bool:
+    def advance(self, q: Array, distances: DistanceBounds) -> bool:
         """Move on to the farthest consecutive sub-goal that is in sight.
 
         Args:
             q: configuration of the arm (nq,).
-            distance: distances of all pairs there (K,) [m].
+            distances: of all pairs there.
 
         Returns:
             Whether the current sub-goal changed.
         """
         before = self.current
-        while not self.is_last and self.is_in_sight(self.current + 1, q, distance):
+        while not self.is_last and self.is_in_sight(self.current + 1, q, distances):
             self.current += 1
         return self.current != before
 
-    def is_in_sight(self, index: int, q: Array, distance: Array) -> bool:
+    def is_in_sight(self, index: int, q: Array, distances: DistanceBounds) -> bool:
         """Return whether a sub-goal is in sight, as the class says.
 
         Args:
             index: of the sub-goal.
             q: configuration of the arm (nq,).
-            distance: distances of all pairs there (K,) [m].
+            distances: of all pairs there.
         """
         bound = self._bound
         step = bound.arm.difference(q, self.q[index])
         if np.abs(step).max() > self.SIGHT:
             return False
-        room = distance - bound.margin + self.slack[index] - 2.0 * self.sensing_distance[index]
-        return bool((bound.motion(step) < room).all())
+        need = bound.margin - self.slack[index] + 2.0 * self.sensing_distance[index]
+        return all_exceed(distances, need + bound.motion(step))
 
 
 def _refine(bound: SweptBound, path: GuidePath) -> Array:

@@ -3,7 +3,7 @@
 from typing import Protocol
 
 from densarm.arrays import Array
-from densarm.clearance import Clearance
+from densarm.density.distance_bounds import DistanceBounds
 from densarm.fields.speed_law import SpeedLaw
 
 
@@ -11,7 +11,7 @@ class VelocityField(Protocol):
     """A planning system q̇ = k(q) on the joint space of an arm, within its speed law."""
 
     @property
-    def clearance(self) -> Clearance:
+    def distances(self) -> DistanceBounds:
         """Distances of all pairs, at the configuration that was updated last."""
         ...
 

@@ -44,14 +44,16 @@ def potential_field(scenario: Scenario, clearance: Clearance, scale: float = 1.0
     sensing = scenario.sensing
     influence = scale * sensing.distance
     potential = JointPotentialField(barriers, goal_distance, influence, sensing.joint)
-    return _follow(scenario, PotentialAscent(potential, speed_law, scenario.gains.rate))
+    field = PotentialAscent(potential, speed_law, scenario.gains.rate)
+    return _follow(scenario, clearance, field)
 
 
 def navigation_function(scenario: Scenario, clearance: Clearance, scale: float = 1.0) -> Drive:
     """Follow Rimon and Koditschek's navigation function."""
     barriers, goal_distance, speed_law = _shared(scenario, clearance)
     potential = JointNavigationFunction(barriers, goal_distance, scale * _KAPPA)
-    return _follow(scenario, PotentialAscent(potential, speed_law, scenario.gains.rate))
+    field = PotentialAscent(potential, speed_law, scenario.gains.rate)
+    return _follow(scenario, clearance, field)
 
 
 def cbf_qp(scenario: Scenario, clearance: Clearance, scale: float = 1.0) -> Drive:
@@ -59,7 +61,7 @@ def cbf_qp(scenario: Scenario, clearance: Clearance, scale: float = 1.0) -> Driv
     barriers, goal_distance, speed_law = _shared(scenario, clearance)
     parameters = BarrierParameters(barrier_rate=scale * BarrierParameters.barrier_rate)
     field = BarrierFilter(barriers, goal_distance, speed_law, scenario.gains.rate, parameters)
-    return _follow(scenario, field)
+    return _follow(scenario, clearance, field)
 
 
 def plan_then_track(scenario: Scenario, clearance: Clearance, scale: float = 1.0) -> Drive | NoPath:
@@ -127,11 +129,11 @@ def _shared(scenario: Scenario, clearance: Clearance) -> tuple[Barriers, GoalDis
     )
 
 
-def _follow(scenario: Scenario, field: VelocityField) -> Drive:
+def _follow(scenario: Scenario, clearance: Clearance, field: VelocityField) -> Drive:
     controller = FieldRegulation(
         scenario.arm, field, scenario.gains, scenario.simulation.control_period
     )
-    return Drive(controller, _describe_rest(field.clearance))
+    return Drive(controller, _describe_rest(clearance))
 
 
 def _describe_rest(clearance: Clearance) -> Callable[[Array], str]:

@@ -12,8 +12,11 @@ from hypothesis.extra.numpy import arrays
 from densarm.clearance import Clearance
 from densarm.closed_loop import make_controller
 from densarm.control.gains import Gains
+from densarm.density import NearPairs
 from densarm.errors import InvalidValueError
-from densarm.motion_plan import plan_motion
+from densarm.guides import GuidePath
+from densarm.motion_plan import MotionPlan, plan_motion
+from densarm.proof.swept_bound import SweptBound
 from densarm.scenario import ControlForm, GuideKind, load_scenario
 
 
@@ -90,3 +93,47 @@ def test_reaches_the_goal_in_a_loop_of_ones_own():
 def test_gains_are_checked(key, value):
     with pytest.raises(InvalidValueError, match=f"^{key} = "):
         Gains(**{key: value})
+
+
+@pytest.fixture(scope="module")
+def panda_table():
+    return load_scenario("panda_table")
+
+
+@pytest.mark.parametrize(
+    ("form", "is_clear"), [(ControlForm.REGULATION, True), (ControlForm.PLAIN, False)]
+)
+def test_a_run_is_that_of_all_pairs_queried_to_the_last_bit(
+    panda_table, form, is_clear, monkeypatch
+):
+    scenario = replace(panda_table, control=replace(panda_table.control, form=form))
+    arm, bound = scenario.arm, SweptBound(Clearance(scenario.arm, scenario.scene))
+    goal = arm.integrate(scenario.start, 0.3 * np.random.default_rng(1).uniform(-1, 1, arm.nv))
+    assert bound.segment_is_clear(scenario.start, goal)
+    path = GuidePath(np.array([scenario.start, goal]), is_clear)
+    lazy = run_along(MotionPlan(scenario, path, bound))
+    sleep = NearPairs.update
+
+    def wake_and_update(pairs, q, margin):
+        pairs.wake_all()
+        sleep(pairs, q, margin)
+
+    monkeypatch.setattr(NearPairs, "update", wake_and_update)
+    states, awake = run_along(MotionPlan(scenario, path, bound))
+    assert awake.min() == bound.clearance.n_pairs
+    assert lazy[1].mean() < 0.2 * bound.clearance.n_pairs
+    np.testing.assert_array_equal(lazy[0], states)
+
+
+def run_along(plan: MotionPlan) -> tuple[np.ndarray, np.ndarray]:
+    """States with their sub-goals, and numbers of pairs awake, in a loop of one's own."""
+    arm, guided = plan.scenario.arm, plan.guided
+    controller, data = make_controller(plan.scenario, plan), arm.model.createData()
+    states, awake, q, v = [], [], plan.scenario.start, np.zeros(arm.nv)
+    for k in range(300):
+        tau = controller.torque(0.002 * k, q, v)
+        v = v + 0.002 * pin.aba(arm.model, data, q, v, tau)
+        q = arm.integrate(q, 0.002 * v)
+        states.append([*q, *v, guided.chain.current])
+        awake.append(np.count_nonzero(guided.distances.state))
+    return np.array(states), np.array(awake)

@@ -10,6 +10,7 @@ from densarm.clearance import Clearance
 from densarm.control.gains import Gains
 from densarm.control.inverse_dynamics import InverseDynamics
 from densarm.control.stopping_guard import StoppingGuard
+from densarm.density.distance_bounds import ExactDistances
 from densarm.fields import SpeedLaw, SpeedParameters
 from densarm.proof.straight_brake import HELD_SHARE
 from densarm.proof.swept_bound import SweptBound
@@ -24,6 +25,10 @@ BOUND = SweptBound(Clearance(ARM, Scene(BALLS)))
 DT = 0.002  # [s]
 
 
+def exact(q):
+    return ExactDistances(BOUND.clearance.distances(q))
+
+
 @settings(max_examples=8)
 @given(seed=st.integers(0, 2**32 - 1))
 def test_no_contact_whatever_torque_is_asked_for(seed):
@@ -36,11 +41,11 @@ def test_no_contact_whatever_torque_is_asked_for(seed):
     for k in range(400):
         if k % 150 == 0:
             pull = rng.uniform(-10.0, 10.0, 2)
-        distance = BOUND.clearance.distances(q)
-        assert (distance > 0.0).all()
+        distances = exact(q)
+        assert (distances.distance > 0.0).all()
         dynamics.update(q, v)
         wanted = dynamics.torque(-0.2 * v, pull)
-        tau = guard.torque(k * DT, dynamics, q, v, wanted, distance)
+        tau = guard.torque(k * DT, dynamics, q, v, wanted, distances)
         assert (np.abs(tau) <= ARM.limits.effort).all()
         v = v + DT * pin.aba(ARM.model, ARM.data, q, v, tau)
         q = pin.integrate(ARM.model, q, DT * v)
@@ -53,14 +58,14 @@ def test_acceleration_changes_by_its_limit_within_a_fortieth_of_a_second_at_most
     for k in range(60):
         dynamics.update(q, v)
         wanted = dynamics.torque(np.zeros(2), (-1) ** (k // 20) * ARM.limits.acceleration)
-        tau = guard.torque(k * DT, dynamics, q, v, wanted, BOUND.clearance.distances(q))
+        tau = guard.torque(k * DT, dynamics, q, v, wanted, exact(q))
         a = pin.aba(ARM.model, ARM.data, q, v, tau).copy()
         assert (np.abs(a - last) <= ARM.limits.acceleration * DT * 40 * (1 + 1e-6)).all()
         v, last = v + DT * a, a
         q = pin.integrate(ARM.model, q, DT * v)
     assert np.abs(last).max() > 0.1
     dynamics.update(q, v)
-    tau = guard.torque(1e3, dynamics, q, v, wanted, BOUND.clearance.distances(q))
+    tau = guard.torque(1e3, dynamics, q, v, wanted, exact(q))
     a = pin.aba(ARM.model, ARM.data, q, v, tau)  # from zero again
     assert (np.abs(a) <= ARM.limits.acceleration * DT * 40 * (1 + 1e-6)).all()
 
@@ -71,4 +76,4 @@ def test_what_is_harmless_is_let_through():
     q, v = ARM.postures["hanging"], np.zeros(2)
     dynamics.update(q, v)
     wanted = dynamics.torque(v, np.array([0.5, 0.0]))
-    assert guard.torque(0.0, dynamics, q, v, wanted, BOUND.clearance.distances(q)) is wanted
+    assert guard.torque(0.0, dynamics, q, v, wanted, exact(q)) is wanted

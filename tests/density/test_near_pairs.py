@@ -100,6 +100,30 @@ def log_bump(unsafe_set, q, nv, theta):
     return unsafe_set.add_log_bump(q, theta, slope), slope
 
 
+@settings(max_examples=10, deadline=None)
+@given(
+    seed=st.integers(0, 2**16),
+    paces=st.lists(st.sampled_from(list(STEPS)), min_size=3, max_size=8),
+    asked=st.lists(st.integers(0, 2**16), min_size=1, max_size=4),
+)
+def test_asking_for_distances_changes_nothing_else(bound, seed, paces, asked):
+    sets = [NearClearanceSet(NearPairs(bound), 0.01, 0.05) for _ in range(2)]
+    pairs = sets[0].pairs
+    for q in walk(bound.arm, seed, paces):
+        (value, slope), (other_value, other_slope) = (
+            log_bump(unsafe, q, bound.arm.nv, 0.0) for unsafe in sets
+        )
+        assert value == other_value
+        np.testing.assert_array_equal(slope, other_slope)
+        exact = bound.clearance.distances(q)
+        for k in asked:
+            pair = k % bound.clearance.n_pairs
+            slept = pairs.state[pair] == 0
+            assert [pairs.query(pair), pairs.query(pair)] == [slept, False]
+            assert pairs.distance[pair] == pytest.approx(exact[pair], abs=1e-8)
+        assert (pairs.distance <= exact + DISTANCE_TOLERANCE).all()
+
+
 def test_most_pairs_sleep_on_a_slow_way(bound):
     pairs = NearPairs(bound)
     pairs.sensing_distance[:] = 0.01

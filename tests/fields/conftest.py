@@ -34,6 +34,6 @@ def make_guided(swing_up):
         chain = SubGoalChain(bound, path, SensingParameters())
         density = DensityParameters(**parameters)
         distance = TorusDistance(scenario.arm, scenario.goal)
-        return bound, GuidedDensity(bound.clearance, chain, margin, density, distance)
+        return bound, GuidedDensity(bound, chain, density, distance)
 
     return make

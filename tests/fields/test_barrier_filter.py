@@ -44,7 +44,7 @@ def configuration(arm, share):
 @settings(max_examples=300)
 @given(share=st.lists(st.floats(0.0, 1.0), min_size=7, max_size=7))
 def test_keeps_every_barrier_and_the_velocity_limits(field, share):
-    arm, barriers = field.clearance.arm, field.barriers
+    arm, barriers = field.barriers.clearance.arm, field.barriers
     velocity = field.update(configuration(arm, share))
     assume(barriers.value.min() >= 0.0)
     parameters = BarrierParameters()
@@ -55,7 +55,7 @@ def test_keeps_every_barrier_and_the_velocity_limits(field, share):
 
 
 def test_in_the_open_it_is_the_pull_of_the_goal(field):
-    arm = field.clearance.arm
+    arm = field.barriers.clearance.arm
     q = arm.integrate(field.goal_distance.goal, np.full(arm.nv, 1e-3))
     slope = np.zeros(arm.nv)
     field.goal_distance.evaluate(q, slope)
@@ -68,13 +68,13 @@ def test_rests_at_the_goal(field):
 
 def test_rests_where_no_velocity_keeps_every_row():
     field = make_field("panda")
-    beyond = field.clearance.arm.limits.upper + 10.0
+    beyond = field.barriers.clearance.arm.limits.upper + 10.0
     np.testing.assert_array_equal(field.update(beyond), 0.0)
 
 
 def test_changes_a_pull_that_leads_into_an_obstacle():
     field = make_field("two_link")
-    q = field.clearance.arm.configuration([1.08, 0.0])
+    q = field.barriers.clearance.arm.configuration([1.08, 0.0])
     slope = np.zeros(2)
     field.goal_distance.evaluate(q, slope)
     velocity, k = field.update(q), field.barriers.value.argmin()

@@ -6,6 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from densarm.density import Gauge
+from densarm.density.distance_bounds import ExactDistances
 from densarm.fields import DensityField, SpeedLaw, SpeedParameters
 
 ANGLES = st.tuples(*[st.floats(-3, 3)] * 2)
@@ -27,7 +28,7 @@ def test_direction_is_the_gradient_and_speed_within_the_law(parts, angles):
     norm = np.linalg.norm(k)
     assert k @ gradient == pytest.approx(norm * np.linalg.norm(gradient))
     if norm > 0.0:
-        distance = bound.clearance.distances(q)
+        distance = ExactDistances(bound.clearance.distances(q))
         assert norm <= law.speed(q, k / norm, distance, sum(guided.way_left(q))) * (1 + 1e-9)
 
 

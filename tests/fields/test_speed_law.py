@@ -10,6 +10,7 @@ from hypothesis.extra.numpy import arrays
 
 from densarm.arm import Arm, load_arm
 from densarm.clearance import Clearance
+from densarm.density.distance_bounds import ExactDistances
 from densarm.errors import InvalidValueError
 from densarm.fields import SpeedLaw, SpeedParameters
 from densarm.proof.straight_brake import StraightBrake
@@ -53,7 +54,7 @@ def brake(bound, v):
 @given(u=directions, near=st.floats(-0.05, 0.3), way=lengths)
 def test_brake_at_full_speed_ends_in_the_free_space_and_before_the_goal(bound, law, u, near, way):
     u, distance = u / np.linalg.norm(u), distances(bound, near)
-    v = law.speed(READY, u, distance, way) * u
+    v = law.speed(READY, u, ExactDistances(distance), way) * u
     assert (np.abs(v) <= bound.arm.limits.velocity * (1 + 1e-12)).all()
     used = bound.motion(brake(bound, v))
     assert (used <= np.maximum(distance - MARGIN, 0.0) * (1 + 1e-9) + 1e-15).all()
@@ -63,11 +64,11 @@ def test_brake_at_full_speed_ends_in_the_free_space_and_before_the_goal(bound, l
 @given(u=directions, near=st.floats(-0.05, 0.3), more=st.floats(0, 0.2), way=lengths)
 def test_speed_grows_with_room_and_way(bound, law, u, near, more, way):
     u, distance = u / np.linalg.norm(u), distances(bound, near)
-    speed = law.speed(READY, u, distance, way)
-    assert law.speed(READY, u, distance + more, way) >= 0.99 * speed
-    assert law.speed(READY, u, distance, way + more) >= 0.99 * speed
+    speed = law.speed(READY, u, ExactDistances(distance), way)
+    assert law.speed(READY, u, ExactDistances(distance + more), way) >= 0.99 * speed
+    assert law.speed(READY, u, ExactDistances(distance), way + more) >= 0.99 * speed
     careful = SpeedLaw(bound, SpeedParameters(braking_share=0.3))
-    assert careful.speed(READY, u, distance, way) <= 1.01 * speed
+    assert careful.speed(READY, u, ExactDistances(distance), way) <= 1.01 * speed
 
 
 def test_a_weak_arm_goes_slower():
@@ -77,7 +78,7 @@ def test_a_weak_arm_goes_slower():
     level, down = strong.configuration([1.5, 0.0]), np.array([-1.0, 0.0])
     speeds = [
         SpeedLaw(SweptBound(Clearance(arm, Scene())), SpeedParameters()).speed(
-            level, down, np.zeros(0), 1.0
+            level, down, ExactDistances(np.zeros(0)), 1.0
         )
         for arm in (strong, weak)
     ]
@@ -95,17 +96,18 @@ def test_can_stop_exactly_where_the_brake_stays_in_the_free_space(bound, law, v,
     free = ((used < room * (1 - 1e-9)) | (used == 0.0)).all()
     touches = ((used > room * (1 + 1e-9)) & (used > 0.0)).any()
     if inside and free:
-        assert law.can_stop(READY, v, distance, motion)
+        assert law.can_stop(READY, v, ExactDistances(distance), motion)
     if not inside or touches:
-        assert not law.can_stop(READY, v, distance, motion)
+        assert not law.can_stop(READY, v, ExactDistances(distance), motion)
 
 
 def test_no_speed_without_room_and_no_bound_without_pairs(bound, law):
     u = np.eye(NV)[0]
-    assert law.speed(READY, u, distances(bound, 0.0), 1.0) == 0.0
+    assert law.speed(READY, u, ExactDistances(distances(bound, 0.0)), 1.0) == 0.0
     arm = load_arm("two_link")
     empty = SpeedLaw(SweptBound(Clearance(arm, Scene())), SpeedParameters())
-    assert empty.speed(arm.postures["hanging"], np.array([1.0, 0.0]), np.zeros(0), 1e9) == 6.0
+    u, none = np.array([1.0, 0.0]), ExactDistances(np.zeros(0))
+    assert empty.speed(arm.postures["hanging"], u, none, 1e9) == 6.0
 
 
 @pytest.mark.parametrize("share", [0.0, -0.1, 1.1, np.nan])
@@ -115,7 +117,7 @@ def test_share_is_checked(share):
 
 
 def test_velocity_share(bound):
-    far, all_the_way = np.full(bound.clearance.n_pairs, 1e9), 1e9
+    far, all_the_way = ExactDistances(np.full(bound.clearance.n_pairs, 1e9)), 1e9
     direction = np.full(NV, NV**-0.5)
     full, half = (SpeedLaw(bound, SpeedParameters(velocity_share=share)) for share in (1.0, 0.5))
     assert half.speed(READY, direction, far, all_the_way) == pytest.approx(

@@ -6,10 +6,11 @@ import pytest
 from densarm.arm import load_arm
 from densarm.clearance import Clearance
 from densarm.density import (
-    ClearanceSet,
     DensityParameters,
     JointLimitSet,
     NavigationDensity,
+    NearClearanceSet,
+    NearPairs,
     TorusDistance,
 )
 from densarm.fields import GuidedDensity, PlanningSystem, SensingParameters, SubGoalChain
@@ -46,8 +47,8 @@ def arm(tmp_path_factory):
 
 
 def stall_of(arm, obstacle, goal, q):
-    clearance = Clearance(arm, Scene([obstacle]))
-    clearance_set = ClearanceSet(clearance, 0.0, 0.05)
+    pairs = NearPairs(SweptBound(Clearance(arm, Scene([obstacle]))))
+    clearance_set = NearClearanceSet(pairs, 0.0, 0.05)
     sets = [clearance_set, JointLimitSet(arm, 0.1)]
     density = NavigationDensity(sets, TorusDistance(arm, np.array(goal), kappa=np.inf))
     return density, find_stall(density, clearance_set, np.full(2, 0.1), np.array(q))
@@ -80,7 +81,7 @@ def test_behind_a_wall_is_a_maximum(arm, across):
     path = DirectGuide().plan(start, np.array(goal), 0)
     chain = SubGoalChain(bound, path, SensingParameters())
     distance = TorusDistance(arm, np.array(goal), kappa=np.inf)
-    guided = GuidedDensity(bound.clearance, chain, 0.0, DensityParameters(), distance)
+    guided = GuidedDensity(bound, chain, DensityParameters(), distance)
     curve = PlanningSystem(guided, bound).integrate(start)
     assert not curve.reached
     assert curve.detail.startswith("maximum of the density at joint positions (-0.1")

@@ -5,6 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from densarm.density.distance_bounds import ExactDistances
 from densarm.errors import InvalidValueError
 from densarm.fields import SensingParameters, SubGoalChain
 from densarm.guides import GuidePath
@@ -17,6 +18,10 @@ OFFSETS = st.tuples(*[st.floats(-0.1, 0.1)] * 2).map(np.array)
 def bound_and_chain(make_guided):
     bound, guided = make_guided()
     return bound, guided.chain
+
+
+def exact(bound, q):
+    return ExactDistances(bound.clearance.distances(q))
 
 
 def test_path_runs_from_start_to_goal(swing_up, bound_and_chain):
@@ -33,7 +38,7 @@ def test_neighbours_see_each_other(bound_and_chain):
     bound, chain = bound_and_chain
     for k in range(1, len(chain.q)):
         chain.current = k - 1
-        chain.advance(chain.q[k - 1], bound.clearance.distances(chain.q[k - 1]))
+        chain.advance(chain.q[k - 1], exact(bound, chain.q[k - 1]))
         assert chain.current >= k
     assert chain.is_last
 
@@ -42,7 +47,7 @@ def test_psi_is_one_on_every_followed_segment(bound_and_chain):
     bound, chain = bound_and_chain
     chain.current = 1
     for q in chain.q:
-        chain.advance(q, bound.clearance.distances(q))
+        chain.advance(q, exact(bound, q))
         step = bound.arm.difference(q, chain.q[chain.current])
         for share in np.linspace(0.0, 1.0, 5):
             h = bound.clearance.distances(bound.arm.integrate(q, share * step)) - bound.margin
@@ -55,7 +60,7 @@ def test_a_sub_goal_in_sight_is_proved_in_sight(bound_and_chain, index, offset):
     before = index % (len(chain.q) - 1)
     q = bound.arm.integrate(chain.q[before], offset)
     chain.current = before
-    if chain.advance(q, bound.clearance.distances(q)):
+    if chain.advance(q, exact(bound, q)):
         target = chain.q[chain.current]
         assert bound.segment_is_clear(q, target)
         assert np.abs(bound.arm.difference(q, target)).max() <= chain.SIGHT
@@ -65,7 +70,7 @@ def test_never_back_and_never_past_an_obstacle(bound_and_chain):
     bound, chain = bound_and_chain
     chain.current = 3
     far = bound.arm.integrate(chain.q[-1], np.array([0.3, 0.3]))
-    chain.advance(far, bound.clearance.distances(far))
+    chain.advance(far, exact(bound, far))
     assert chain.current == 3
 
 
@@ -81,7 +86,7 @@ def test_direct_way_has_one_sub_goal_and_full_sensing(make_guided):
 def test_in_an_empty_scene_sight_ends_at_a_quarter_turn(make_guided):
     bound, guided = make_guided(scene=Scene())
     chain = guided.chain
-    chain.advance(chain.q[0], bound.clearance.distances(chain.q[0]))
+    chain.advance(chain.q[0], exact(bound, chain.q[0]))
     seen = bound.arm.difference(chain.q[0], chain.q[chain.current])
     assert 1.5 < np.abs(seen).max() <= np.pi / 2
 
