@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from densarm.arm import load_arm
-from densarm.joint_torques import joint_torques
+from densarm.joint_torques import JointTorques
 
 
 @pytest.mark.parametrize("name", ["two_link", "panda"])
@@ -12,7 +12,7 @@ from densarm.joint_torques import joint_torques
 def test_equation_of_motion(name, shape):
     arm, rng = load_arm(name), np.random.default_rng(1)
     angles, v, a = (rng.uniform(-1.0, 1.0, (*shape, arm.nv)) for _ in range(3))
-    torque = joint_torques(arm, arm.configurations(angles), v, a)
+    torque = JointTorques(arm)(arm.configurations(angles), v, a)
     assert torque.shape == v.shape
     for index in np.ndindex(*shape):
         q = arm.configuration(angles[index])
@@ -23,6 +23,6 @@ def test_equation_of_motion(name, shape):
 def test_one_joint():
     arm = load_arm("two_link", locked_joints={"elbow": 0.0})
     q = np.tile(arm.configuration([0.3]), (4, 1))
-    torque = joint_torques(arm, q, np.zeros((4, 1)), np.ones((4, 1)))
+    torque = JointTorques(arm)(q, np.zeros((4, 1)), np.ones((4, 1)))
     assert torque.shape == (4, 1)
     assert np.ptp(torque) <= 1e-12

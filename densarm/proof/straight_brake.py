@@ -4,7 +4,7 @@ import numpy as np
 
 from densarm.arm import Arm
 from densarm.arrays import Array
-from densarm.joint_torques import joint_torques
+from densarm.joint_torques import JointTorques
 
 HELD_SHARE = 0.95
 """Share of the acceleration limits that is asked for: a torque is held while the state changes."""
@@ -38,6 +38,7 @@ class StraightBrake:
         self, arm: Arm, acceleration_share: float = HELD_SHARE, torque_share: float = 1.0
     ) -> None:
         self._arm = arm
+        self._torques = JointTorques(arm)
         self._acceleration = acceleration_share * arm.limits.acceleration
         self._effort = torque_share * arm.limits.effort * (1.0 + _ROUNDING)
 
@@ -71,12 +72,12 @@ class StraightBrake:
         q = self._arm.configurations(theta)
         speed = (1.0 - _SHARES)[:, np.newaxis] * v[:, np.newaxis]
         brake = -_BRAKES[:, np.newaxis] * (v / duration[:, np.newaxis])[:, np.newaxis]
-        torque = joint_torques(self._arm, q, speed, brake)
+        torque = self._torques(q, speed, brake)
         growth = np.ones(len(v))
         weak = ~(np.abs(torque) <= self._effort).all(axis=(1, 2))
         if not weak.any():
             return growth
-        held = joint_torques(self._arm, q[weak], speed[weak], np.zeros_like(speed[weak]))
+        held = self._torques(q[weak], speed[weak], np.zeros_like(speed[weak]))
         growth[weak] = self._needed(held, torque[weak] - held)
         return growth
 

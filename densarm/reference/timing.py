@@ -13,7 +13,7 @@ from toppra.constraint import canlinear_colloc_to_interpolate
 from densarm.arm import Arm
 from densarm.arrays import Array
 from densarm.holding_torque import holding_ratios, holding_torque
-from densarm.joint_torques import joint_torques
+from densarm.joint_torques import JointTorques
 from densarm.proof.stopping_check import StoppingCheck
 from densarm.reference.infeasible_timing import InfeasibleTimingError
 from densarm.reference.reference import Reference
@@ -166,7 +166,7 @@ def _largest_share(arm: Arm, reference: Reference, parameters: TimingParameters)
     """
     v, limits = reference.velocity, arm.limits
     a = np.diff(v, axis=0) / reference.period
-    torque = joint_torques(arm, arm.configurations(reference.position[:-1]), v[:-1], a)
+    torque = JointTorques(arm)(arm.configurations(reference.position[:-1]), v[:-1], a)
     used = (
         np.abs(v) / (parameters.velocity_share * limits.velocity),
         np.abs(a) / (parameters.acceleration_share * limits.acceleration),
@@ -233,8 +233,9 @@ class _Limits(toppra.constraint.LinearConstraint):
         self.dof, self.identical = arm.nv, True
         theta, slope, bend = (path(grid, order) for order in range(3))
         q, zero = arm.configurations(theta), np.zeros_like(slope)
+        torques = JointTorques(arm)
         held, driven, swung = (
-            joint_torques(arm, q, v, a) for v, a in ((zero, zero), (zero, slope), (slope, bend))
+            torques(q, v, a) for v, a in ((zero, zero), (zero, slope), (slope, bend))
         )
         shares, limits = parameters, arm.limits
         limit = np.append(
