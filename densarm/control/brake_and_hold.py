@@ -36,6 +36,7 @@ class BrakeAndHold:
         self._gains = gains
         self._period = self._shortest = period
         self._dynamics = InverseDynamics(arm, _ACCELERATION_SHARE * arm.limits.acceleration)
+        self._dynamics.torque(np.zeros(arm.nv), np.zeros(arm.nv))  # loads its kernel before a loop
         self._brake = StraightBrake(arm, _ACCELERATION_SHARE)
         self._time_left = math.nan
         self._rest: Array | None = None

@@ -37,6 +37,8 @@ class ComputedTorque:
         self._dynamics = InverseDynamics(arm, HELD_SHARE * arm.limits.acceleration)
         self._wanted = TorusDistance(arm, arm.configuration(reference.position[0]))
         self._error = np.zeros(arm.nv)
+        # Kernels are loaded, or compiled, here rather than in the first step of a control loop.
+        self.torque(0.0, self._wanted.goal, self._error)
 
     @property
     def tracking_error(self) -> float:

@@ -1,5 +1,6 @@
 """DensityFeedback: the plain law u = ∇ρ + d(q, q̇)."""
 
+import numpy as np
 from numpy.typing import ArrayLike
 
 from densarm.arm import Arm
@@ -41,6 +42,9 @@ class DensityFeedback:
         self._dynamics = InverseDynamics(arm, HELD_SHARE * arm.limits.acceleration)
         self._guard = StoppingGuard(arm, field.speed_law, gains, period)
         self._metric = 1.0 / arm.mass_matrix(field.guided.chain.q[-1]).diagonal().max()
+        # Kernels are loaded, or compiled, here rather than in the first step of a control loop.
+        self.torque(-np.inf, arm.configuration(np.zeros(arm.nv)), np.zeros(arm.nv))
+        field.restart()
 
     def torque(self, t: float, q: ArrayLike, v: ArrayLike) -> Array:
         """Act as `Controller.torque`."""

@@ -86,7 +86,7 @@ class DensityTracking:
         density.update_psi(q)
         self._dynamics.update(q, v)
         tau = np.empty(len(v))
-        write_torque(t, q, v, density.log_psi, tau, *self._fixed)
+        write_torque(float(t), q, v, density.log_psi, tau, *self._fixed)
         return tau
 
 

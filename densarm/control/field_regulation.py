@@ -1,5 +1,6 @@
 """FieldRegulation: the inverse-dynamics controller that follows a planning system."""
 
+import numpy as np
 from numpy.typing import ArrayLike
 
 from densarm.arm import Arm
@@ -36,6 +37,9 @@ class FieldRegulation:
         self._gain = gains.velocity
         self._dynamics = InverseDynamics(arm, HELD_SHARE * arm.limits.acceleration)
         self._guard = StoppingGuard(arm, field.speed_law, gains, period)
+        # Kernels are loaded, or compiled, here rather than in the first step of a control loop.
+        self.torque(-np.inf, arm.configuration(np.zeros(arm.nv)), np.zeros(arm.nv))
+        field.restart()
 
     def torque(self, t: float, q: ArrayLike, v: ArrayLike) -> Array:
         """Act as `Controller.torque`."""

@@ -1,5 +1,6 @@
 """FieldVelocity: the planning system of an arm as a velocity controller."""
 
+import numpy as np
 from numpy.typing import ArrayLike
 
 from densarm.arm import Arm
@@ -23,6 +24,9 @@ class FieldVelocity:
     def __init__(self, arm: Arm, field: VelocityField) -> None:
         self._arm = arm
         self._field = field
+        # Kernels are loaded, or compiled, here rather than in the first step of a control loop.
+        self.velocity(0.0, arm.configuration(np.zeros(arm.nv)), np.zeros(arm.nv))
+        field.restart()
 
     def velocity(self, t: float, q: ArrayLike, v: ArrayLike) -> Array:
         """Act as `VelocityController.velocity`."""

@@ -88,6 +88,10 @@ class GuardedController:
         self._knows_state = self._trusts_state = False
         self._brakes_anew = self._has_rested = self._needs_plan = False
         self._state = self._observer.q, self._observer.v
+        # Kernels are loaded, or compiled, here rather than in a control loop.
+        self._measured(0.0, *self._state)
+        _repeats(self._observer.q, self._last_q.copy())
+        _takes(self._tau, arm.limits.effort, self._tau)
 
     @property
     def status(self) -> GuardStatus:

@@ -41,6 +41,9 @@ class StateObserver:
         """Observed configuration (nq,), overwritten by the next call."""
         self.v: Array = np.zeros(arm.nv)
         """Observed velocity (nv,) [rad/s or m/s], overwritten by the next call."""
+        # Kernels are loaded, or compiled, here rather than in a control loop.
+        self.advance(0.0, 1.0, self.v)
+        self.agrees(self.q, self.v, 0.0)
 
     def start(self, q: Array, v: Array) -> None:
         """Begin at a state, q (nq,) and v (nv,)."""

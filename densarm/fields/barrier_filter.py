@@ -85,6 +85,9 @@ class BarrierFilter:
         """As `VelocityField.distances`."""
         return ExactDistances(self.barriers.clearance.distance)
 
+    def restart(self) -> None:
+        """Act as `VelocityField.restart`, with nothing to forget."""
+
     def update(self, q: Array) -> Array:
         """Return k (nv,) at q (nq,) [rad/s or m/s]; zero where no velocity keeps every row."""
         self.barriers.update(q)

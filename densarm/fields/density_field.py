@@ -40,6 +40,10 @@ class DensityField:
         """As `VelocityField.distances`."""
         return self.guided.distances
 
+    def restart(self) -> None:
+        """Act as `GuidedDensity.restart`."""
+        self.guided.restart()
+
     def update(self, q: Array, metric: Array | None = None) -> Array:
         """Return k(q) and move on along the sub-goals.
 

@@ -54,6 +54,9 @@ class PotentialAscent:
         """As `VelocityField.distances`."""
         return ExactDistances(self.potential.barriers.clearance.distance)
 
+    def restart(self) -> None:
+        """Act as `VelocityField.restart`, with nothing to forget."""
+
     def update(self, q: Array) -> Array:
         """Act as `VelocityField.update`."""
         velocity = self._rate * self.potential.direction(q)

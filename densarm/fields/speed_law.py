@@ -6,7 +6,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from densarm.arrays import Array
-from densarm.density.distance_bounds import DistanceBounds, all_exceed, least_room
+from densarm.density.distance_bounds import (
+    DistanceBounds,
+    ExactDistances,
+    all_exceed,
+    least_room,
+)
 from densarm.errors import InvalidValueError
 from densarm.proof.straight_brake import StraightBrake
 from densarm.proof.swept_bound import SweptBound
@@ -57,6 +62,7 @@ class SpeedLaw:
         self._margin = bound.margin
         self._parameters = parameters
         self._brake = StraightBrake(bound.arm)
+        least_room(ExactDistances(np.zeros(0)), 0.0, np.zeros(0))  # loads its kernel before a loop
 
     def speed(
         self, q: Array, direction: Array, distances: DistanceBounds, way_left: float

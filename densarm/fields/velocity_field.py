@@ -20,6 +20,10 @@ class VelocityField(Protocol):
         """How fast the arm may go and still stop in the free space ahead."""
         ...
 
+    def restart(self) -> None:
+        """Forget where the arm was."""
+        ...
+
     def update(self, q: Array) -> Array:
         """Return k (nv,) at q (nq,) [rad/s or m/s]; zero where it leads nowhere."""
         ...
