@@ -65,10 +65,6 @@ class StepTiming:
     undisturbed_percentiles_us: Percentiles
     """As `step_percentiles_us`, of the least time that each state took in all its visits: without
     what other processes do to caches and clocks. A visit to all states takes 4002 steps [µs]."""
-    preparation_s: float
-    """Making the controller, its kernels loaded or compiled [s]."""
-    first_step_us: float
-    """The first step, in which all pairs are queried [µs]."""
     memory_growth_kb: float
     """By how much the process's peak memory grew during the steps [kB]."""
     collections: int
@@ -99,12 +95,9 @@ def time_step(arm: str, shapes: str = "hull", pairs: int = 64, steps: int = 20_0
     loaded = load_arm(arm, shapes=shapes)
     reference = swing(loaded)
     clearance = clearance_among_spheres(loaded, reference, pairs)
-    began = time.perf_counter()
     density = full_sensing_density(clearance, loaded.configuration(reference.position[-1]))
     step = DensityTracking(loaded, density, reference, Gains()).torque
-    preparation = time.perf_counter() - began
     bare, states = _bare_calls(clearance), _states(loaded, reference)
-    first = float(_seconds(step, states[:1], np.empty((2, 1)))[0, 0])
     turns, seconds = (step, bare), np.full((2, 2, steps), np.nan)  # pages are touched here
     warm_up = np.empty((2, _BLOCK))
     for calls in turns:
@@ -126,8 +119,6 @@ def time_step(arm: str, shapes: str = "hull", pairs: int = 64, steps: int = 20_0
         _percentiles(seconds[0, 1]),
         _percentiles(seconds[1, 1]),
         _percentiles(_least_of_visits(seconds[0, 1], len(to_and_fro))),
-        preparation,
-        1e6 * first,
         _peak_memory() - memory,
         _collections() - collections,
     )

@@ -62,7 +62,9 @@ def step(arm: str, shapes: str, pairs: int, steps: int, json: Path | None) -> in
     The whole `controller.torque` is compared with bare calls of Pinocchio and coal for the
     distances of all pairs (computeJointJacobians, updateGeometryPlacements, computeDistances, rnea)
     in the same states, in turns, while the arm swings to and fro among spheres. Percentiles are
-    of processor time; undisturbed ones of the least time that each state took in its visits.
+    of processor time; undisturbed ones of the least time that each state took in its visits. The
+    first call, for which kernels are compiled or loaded from disk when the controller is made, is
+    timed in new processes.
 
     \b
     Example:
@@ -70,11 +72,14 @@ def step(arm: str, shapes: str, pairs: int, steps: int, json: Path | None) -> in
     """  # noqa: D301
     with progress() as report:
         report("measuring")
+        from densarm.bench.first_call import time_first_calls
         from densarm.bench.step import time_step
 
         result = time_step(arm, shapes, pairs, steps)
+        report("compiling in a new process")
+        first = time_first_calls(arm, shapes, pairs)
         if json:
-            write_json(json, result.to_json())
+            write_json(json, {**result.to_json(), "first_calls": first.to_json()})
     click.echo(f"controller.torque  {result.step_us:.1f} µs")
     click.echo(f"bare calls         {result.bare_us:.1f} µs")
     click.echo(f"ratio              {result.ratio:.2f}")
@@ -86,8 +91,9 @@ def step(arm: str, shapes: str, pairs: int, steps: int, json: Path | None) -> in
     ):
         at = ", ".join(f"{time:.1f}" for time in times)
         click.echo(f"{name:<18} {at} µs at 50, 99, 99.9 %")
-    click.echo(f"first step         {result.first_step_us:.0f} µs, all pairs queried")
-    click.echo(f"preparation        {result.preparation_s:.2f} s")
+    for name, call in (("compiled", first.compiled), ("loaded from disk", first.loaded)):
+        made = f"{call.preparation_s:.2f} s before it, kernels {name}"
+        click.echo(f"first call         {call.torque_us:.0f} µs, all pairs queried; {made}")
     click.echo(f"memory growth      {result.memory_growth_kb:.0f} kB")
     click.echo(f"collections        {result.collections}")
     return ExitStatus.SUCCESS

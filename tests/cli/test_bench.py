@@ -3,6 +3,7 @@ import json
 import numpy as np
 import pytest
 
+from densarm.bench.first_call import FirstCall, FirstCalls
 from densarm.bench.problem_result import ProblemResult
 from densarm.trajectory import Trajectory
 
@@ -10,7 +11,9 @@ GOAL = [np.cos(0.5), np.sin(0.5)]  # of the shoulder
 
 
 @pytest.mark.parametrize(("arm", "pairs"), [("two_link", 4), ("panda", 20)])
-def test_step_reports_its_keys(command, tmp_path, arm, pairs):
+def test_step_reports_its_keys(command, tmp_path, monkeypatch, arm, pairs):
+    first = FirstCalls(FirstCall(9.0, 300.0), FirstCall(0.4, 200.0))
+    monkeypatch.setattr("densarm.bench.first_call.time_first_calls", lambda *_: first)
     path = tmp_path / "step.json"
     done = command("bench", "step", "--arm", arm, "--pairs", pairs, "--steps", 250, "--json", path)
     assert done.status == 0
@@ -20,10 +23,12 @@ def test_step_reports_its_keys(command, tmp_path, arm, pairs):
     assert (data["pairs"], data["steps"]) == (pairs, 250)
     for key in ("step_percentiles_us", "bare_percentiles_us", "undisturbed_percentiles_us"):
         assert 0.0 < data[key][0] <= data[key][1] <= data[key][2]
-    assert min(data["step_us"], data["bare_us"], data["first_step_us"]) > 0.0
+    assert min(data["step_us"], data["bare_us"]) > 0.0
     assert min(data["memory_growth_kb"], data["collections"]) >= 0
     assert data["ratio"] == pytest.approx(data["step_us"] / data["bare_us"])
     assert f"{data['ratio']:.2f}" in done.out
+    assert data["first_calls"]["loaded"] == {"preparation_s": 0.4, "torque_us": 200.0}
+    assert "300 µs, all pairs queried; 9.00 s before it, kernels compiled" in done.out
 
 
 RANDOM = ("bench", "random", "--arm", "two_link", "--problems", 1, "--scenes", "none")
