@@ -17,7 +17,6 @@ from densarm.proof.swept_bound import SweptBound
 
 _ASLEEP, _AWAKE = 0, 1
 _NEVER = 0  # seen, of a pair that must be queried
-_STEPS = 8.0  # that a pair must be able to sleep: waking it costs as much as some queries
 _LONGEST_WAY = 1e4  # [rad or m], beyond which sums of small steps would round off too much
 
 
@@ -180,13 +179,11 @@ def _wake(
             state[k], level[k] = _ASLEEP, np.inf
         elif changes[k] != seen[k] or wakes_all:
             state[k] = _AWAKE
-        elif before == _ASLEEP:
-            state[k] = _ASLEEP if level[k] - gone > reach else _AWAKE
         else:
-            step = _motion(lever[k], joint_numbers[1])
-            if rows[k, 0] - reach > (_STEPS + 1.0) * step:
-                state[k] = _ASLEEP
-                level[k] = rows[k, 0] + (gone - step)
+            if before == _AWAKE:
+                level[k] = rows[k, 0] + (gone - _motion(lever[k], joint_numbers[1]))
+            # A sleep of a few steps saves nothing, but pairs that close to their reach are few.
+            state[k] = _ASLEEP if level[k] - gone > reach else _AWAKE
         seen[k] = changes[k]
         n_awake += state[k]
         if (before == _ASLEEP) != (state[k] == _ASLEEP):
