@@ -57,11 +57,13 @@ class MotionPlan:
     @cached_property
     def guided(self) -> GuidedDensity:
         """The density along the sub-goals."""
-        scenario = self.scenario
+        scenario, density = self.scenario, self.scenario.density
+        if scenario.control.form == ControlForm.TRACKING:
+            density = replace(density, alpha=scenario.control.planning_alpha)
         return GuidedDensity(
             self.bound,
             SubGoalChain(self.bound, self.path, scenario.sensing),
-            scenario.density,
+            density,
             _goal_distance(scenario),
         )
 
@@ -74,6 +76,9 @@ def plan_motion(
     scenario: Scenario, clearance: Clearance, guide: Guide | GuideKind
 ) -> MotionPlan | NoPath:
     """Plan a motion: sub-goals, and for tracking the integral curve, a smooth path, its timing.
+
+    Where the curve from the start gets stuck, and the one from the goal with the start as its goal
+    does not, it is the second one, gone backwards. Where both get stuck it is the first.
 
     Args:
         scenario: start, goal, parameters and seed.
@@ -121,7 +126,14 @@ def _curve(plan: MotionPlan) -> Array:
     path = plan.path
     if path.is_clear:
         return path.waypoints
-    return PlanningSystem(plan.guided, plan.bound).integrate(path.waypoints[0]).q
+    curve = PlanningSystem(plan.guided, plan.bound).integrate(path.waypoints[0])
+    if not curve.reached:
+        # A goal lies in narrow space more often than a start, and leaving is easier than entering.
+        back = replace(plan, path=GuidePath(path.waypoints[::-1], is_clear=False))
+        returned = PlanningSystem(back.guided, plan.bound).integrate(path.waypoints[-1])
+        if returned.reached:
+            return returned.q[::-1]
+    return curve.q
 
 
 def _chosen(

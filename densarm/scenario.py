@@ -30,7 +30,7 @@ from densarm.scene import Scene
 from densarm.scene_files.scene_tables import parse_scene
 from densarm.simulation.fixed_step_loop import SimulationParameters
 from densarm.tables import parse_table
-from densarm.validation import finite_vector, non_negative, non_negative_integer, one_of
+from densarm.validation import finite_vector, non_negative, non_negative_integer, one_of, positive
 
 
 class GuideKind(StrEnum):
@@ -71,12 +71,17 @@ class ControlParameters:
     """Distance that paths keep beyond m, less in narrow spaces and near start and goal [m]."""
     kappa: float = 1.0
     """κ of the goal distance, between product and sum; the plain form has the sum."""
+    planning_alpha: float = 10.0
+    """α of the planning system where its curve is tracked, so that its direction alone counts.
+    The larger, the closer to obstacles ρ leads, and the fewer its spurious maxima: [ZNV] Remark 3
+    takes 1 to 10."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "form", ControlForm(one_of("form", self.form, list(ControlForm))))
         object.__setattr__(self, "guide", GuideKind(one_of("guide", self.guide, list(GuideKind))))
         non_negative("margin", self.margin)
         non_negative("path_margin", self.path_margin)
+        positive("planning_alpha", self.planning_alpha)
         if not self.kappa >= KAPPA_MIN:
             raise InvalidValueError("kappa", self.kappa, f"a number >= {KAPPA_MIN}, or infinity")
 

@@ -6,7 +6,9 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
+import densarm
 from densarm.clearance import Clearance
+from densarm.fields import PlanningSystem
 from densarm.guides import DirectGuide, GuidePath, NoPath
 from densarm.motion_plan import plan_motion
 from densarm.reference import InfeasibleTimingError
@@ -84,3 +86,52 @@ def test_a_guide_of_ones_own(swing_up):
     guide = Upward()
     planned(replace(swing_up, seed=7), guide)
     assert guide.seed == 7
+
+
+def among(obstacles, start, goal):
+    """Return a disc's way in the plane, with a reference to where its density leads."""
+    disc = densarm.Sphere(name="disc", radius=0.1)
+    arm = densarm.free_body(disc, "plane", [(-1.2, 1.2)] * 2)
+    scene, start, goal = densarm.Scene(obstacles), np.array(start), np.array(goal)
+    return densarm.Scenario("plane", "A disc in the plane", arm, scene, start, goal)
+
+
+def test_stuck_from_the_start_it_comes_back_from_the_goal():
+    wall = densarm.Box(name="wall", size=(0.1, 1.0, 0.3))
+    beside, behind = (-0.6, 0.9), (0.3, 0.2)
+    for start, goal in ((beside, behind), (behind, beside)):
+        plan = planned(among([wall], start, goal), GuideKind.DIRECT)
+        np.testing.assert_allclose(plan.reference.position[[0, -1]], [start, goal], atol=1e-9)
+        curve = PlanningSystem(plan.guided, plan.bound).integrate(plan.path.waypoints[0])
+        assert curve.reached == (start == behind)
+
+
+def test_stuck_from_both_ends_it_goes_where_the_start_leads():
+    cap = [
+        densarm.Box(name="back", size=(0.1, 1.0, 0.3)),
+        densarm.Box(name="upper", size=(0.5, 0.1, 0.3), position=(0.2, 0.45, 0.0)),
+        densarm.Box(name="lower", size=(0.5, 0.1, 0.3), position=(0.2, -0.45, 0.0)),
+    ]
+    plan = planned(among(cap, (-0.7, 0.0), (0.25, 0.0)), GuideKind.DIRECT)
+    curve = PlanningSystem(plan.guided, plan.bound).integrate(plan.path.waypoints[0])
+    assert not curve.reached
+    np.testing.assert_allclose(plan.reference.position[-1], curve.q[-1], atol=1e-9)
+
+
+@pytest.mark.parametrize(("planning_alpha", "passes"), [(1.0, False), (10.0, True)])
+def test_a_larger_alpha_leads_through_a_narrower_gap(planning_alpha, passes):
+    posts = [
+        densarm.Sphere(name=name, radius=0.2, position=(0.0, y, 0.0))
+        for name, y in (("left", 0.33), ("right", -0.33))
+    ]
+    scenario = among(posts, (-0.7, 0.02), (0.7, 0.0))
+    control = replace(scenario.control, planning_alpha=planning_alpha)
+    plan = planned(replace(scenario, control=control), GuideKind.DIRECT)
+    assert (plan.reference.position[-1, 0] > 0.0) == passes
+
+
+@pytest.mark.parametrize("form", ControlForm)
+def test_feedback_keeps_its_own_alpha(swing_up, form):
+    plan = planned(swing_up, GuideKind.DIRECT, form)
+    wanted = 10.0 if form == ControlForm.TRACKING else swing_up.density.alpha
+    assert plan.guided.density.parameters.alpha == wanted

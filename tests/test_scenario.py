@@ -173,6 +173,7 @@ def test_cut_joints(tmp_path):
         (BASE + "[control]\nmargin = -0.1\n", "control.margin = -0.1"),
         (BASE + "[control]\nmargin = '5 mm'\n", "control.margin = '5 mm'"),
         (BASE + "[control]\nkappa = 0\n", "control.kappa = 0"),
+        (BASE + "[control]\nplanning_alpha = 0\n", "control.planning_alpha = 0"),
         (BASE + "[control]\nkappa = nan\n", "control.kappa = nan"),
         (BASE + "[control]\nguide = 'astar'\n", "control.guide = 'astar'"),
         (BASE + "[simulation]\ndt = 0\n", "simulation.dt = 0"),

@@ -10,7 +10,8 @@ class DirectGuide:
     """Leave the whole way to the density, as [ZNV] does.
 
     The segment from start to goal is not claimed to be clear: the density bends around what
-    blocks it, or gets stuck there.
+    blocks it, or gets stuck there. Where a reference is tracked it may come from either end, as
+    `plan_motion` says.
     """
 
     def plan(self, start: Array, goal: Array, seed: int) -> GuidePath:  # noqa: ARG002

@@ -3,7 +3,11 @@
 import numpy as np
 import pytest
 
-from densarm.fields import PlanningSystem
+from densarm.clearance import Clearance
+from densarm.density import DensityParameters, TorusDistance
+from densarm.fields import GuidedDensity, PlanningSystem, SensingParameters, SubGoalChain
+from densarm.guides import GuidePath
+from densarm.proof.swept_bound import SweptBound
 from densarm.scene import Scene, Sphere
 
 
@@ -70,3 +74,16 @@ def test_again_from_the_start(make_guided):
     system = PlanningSystem(guided, bound)
     first, second = (system.integrate(guided.chain.q[0]) for _ in range(2))
     np.testing.assert_array_equal(first.q, second.q)
+
+
+def test_at_a_sub_goal_without_sight_of_the_next_it_is_stuck(swing_up):
+    angles = [(0.0, 0.0), (1.0, -1.5), (np.pi, 0.0)]
+    path = GuidePath(swing_up.arm.configurations(np.array(angles)), is_clear=False)
+    bound = SweptBound(Clearance(swing_up.arm, swing_up.scene))
+    chain = SubGoalChain(bound, path, SensingParameters())
+    distance = TorusDistance(swing_up.arm, swing_up.goal)
+    guided = GuidedDensity(bound.clearance, chain, 0.0, DensityParameters(), distance)
+    curve = PlanningSystem(guided, bound).integrate(path.waypoints[0])
+    assert not curve.reached
+    np.testing.assert_array_equal(curve.q[-1], path.waypoints[1])
+    assert len(np.unique(curve.q, axis=0)) == len(curve.q)
