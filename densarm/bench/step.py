@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pinocchio as pin
+from numpy.typing import NDArray
 
 from densarm.arm import Arm, load_arm
 from densarm.arrays import Array
@@ -34,6 +35,7 @@ from densarm.validation import positive_integer
 _OFF_REFERENCE = 1e-3  # of the states in every joint [rad or m]
 _BLOCK = 499  # states between two turns; no divisor of a visit to all, so that turns shift
 _PERCENT = (50.0, 99.0, 99.9)
+_THIS_THREAD = getattr(resource, "RUSAGE_THREAD", resource.RUSAGE_SELF)  # macOS has the second
 
 Step = Callable[[float, Array, Array], object]
 State = tuple[float, Array, Array]
@@ -65,6 +67,14 @@ class StepTiming:
     undisturbed_percentiles_us: Percentiles
     """As `step_percentiles_us`, of the least time that each state took in all its visits: without
     what other processes do to caches and clocks. A visit to all states takes 4002 steps [µs]."""
+    steady_percentiles_us: Percentiles | None
+    """As `step_percentiles_us`, of the steps that follow a step directly: not the first of a turn,
+    nor one in or before which another process had the core. Whatever else runs takes the caches,
+    and the next step fetches all again [µs]. None if there was no such step."""
+    resumed_us: float
+    """The first step of a turn, after the bare calls have had the caches: median [µs]."""
+    switches: int
+    """How often another process took the core from the steps."""
     memory_growth_kb: float
     """By how much the process's peak memory grew during the steps [kB]."""
     collections: int
@@ -98,30 +108,41 @@ def time_step(arm: str, shapes: str = "hull", pairs: int = 64, steps: int = 20_0
     density = full_sensing_density(clearance, loaded.configuration(reference.position[-1]))
     step = DensityTracking(loaded, density, reference, Gains()).torque
     bare, states = _bare_calls(clearance), _states(loaded, reference)
-    turns, seconds = (step, bare), np.full((2, 2, steps), np.nan)  # pages are touched here
-    warm_up = np.empty((2, _BLOCK))
+    turns, record = (step, bare), np.full((2, 3, steps), np.nan)  # pages are touched here
+    warm_up = np.empty((3, _BLOCK))
     for calls in turns:
-        _seconds(calls, states[:_BLOCK], warm_up)
+        _timed(calls, states[:_BLOCK], warm_up)
     memory, collections = _peak_memory(), _collections()
     to_and_fro = [*states, *states[::-1]]
-    for begin in range(0, steps, _BLOCK):
-        count = min(_BLOCK, steps - begin)
-        block = [to_and_fro[k % len(to_and_fro)] for k in range(begin, begin + count)]
-        for calls, record in zip(turns, seconds, strict=True):
-            _seconds(calls, block, record[:, begin:])
-    step_us, bare_us = (float(np.median(record[0])) * 1e6 for record in seconds)
+    _take_turns(turns, to_and_fro, record)
+    (step_us, bare_us), processor = 1e6 * np.median(record[:, 0], axis=1), record[:, 1]
+    switches = record[0, 2]
+    steady = processor[0, _follows_a_step(switches)]
     return StepTiming(
-        step_us,
-        bare_us,
-        step_us / bare_us,
+        float(step_us),
+        float(bare_us),
+        float(step_us / bare_us),
         clearance.n_pairs,
         steps,
-        _percentiles(seconds[0, 1]),
-        _percentiles(seconds[1, 1]),
-        _percentiles(_least_of_visits(seconds[0, 1], len(to_and_fro))),
+        _percentiles(processor[0]),
+        _percentiles(processor[1]),
+        _percentiles(_least_of_visits(processor[0], len(to_and_fro))),
+        _percentiles(steady) if steady.size else None,
+        1e6 * float(np.median(processor[0, ::_BLOCK])),
+        int(switches.sum()),
         _peak_memory() - memory,
         _collections() - collections,
     )
+
+
+def _take_turns(turns: tuple[Step, Step], states: list[State], record: Array) -> None:
+    """Fill a record (2, 3, N) with blocks of the states, each visited by one after the other."""
+    steps = record.shape[-1]
+    for begin in range(0, steps, _BLOCK):
+        count = min(_BLOCK, steps - begin)
+        block = [states[k % len(states)] for k in range(begin, begin + count)]
+        for calls, of_calls in zip(turns, record, strict=True):
+            _timed(calls, block, of_calls[:, begin:])
 
 
 def _percentiles(seconds: Array) -> Percentiles:
@@ -136,15 +157,37 @@ def _least_of_visits(seconds: Array, period: int) -> Array:
     return np.asarray(least[np.isfinite(least)])
 
 
-def _seconds(step: Step, states: list[State], out: Array) -> Array:
-    """Time every call by itself; write wall and processor time (2, at least N) into `out`."""
+def _follows_a_step(switches: Array) -> NDArray[np.bool_]:
+    """Return which steps (N,) follow a step of their turn, both without a switch."""
+    switched = switches > 0.0
+    follows = ~switched
+    follows[1:] &= ~switched[:-1]
+    follows[::_BLOCK] = False
+    return follows
+
+
+def _timed(step: Step, states: list[State], out: Array) -> Array:
+    """Time every call by itself.
+
+    Into `out` (3, at least N) go wall and processor time of each, and how often another process
+    took the core in it or between it and the one before.
+    """
+    before = _switches()
     for k, state in enumerate(states):
         began_processor = time.thread_time()
         began = time.perf_counter()
         step(*state)
         out[0, k] = time.perf_counter() - began
         out[1, k] = time.thread_time() - began_processor
+        after = _switches()
+        out[2, k] = after - before
+        before = after
     return out
+
+
+def _switches() -> int:
+    """Return how often the scheduler took the core from this thread."""
+    return resource.getrusage(_THIS_THREAD).ru_nivcsw
 
 
 def _peak_memory() -> float:

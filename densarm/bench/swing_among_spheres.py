@@ -16,6 +16,7 @@ _AMPLITUDE = 0.3  # [rad or m]
 _RADIUS = 0.05  # [m]
 _NEAREST = 0.02  # distance from a sphere to the arm, at least [m]
 _CANDIDATES = 50  # per sphere
+_GROUP = 50  # candidates measured at once: making a Clearance takes the square of its pairs
 
 
 def swing(arm: Arm) -> Reference:
@@ -67,14 +68,14 @@ def _spheres(arm: Arm, reference: Reference, count: int) -> list[Sphere]:
         candidates.append(
             Sphere(name=f"sphere_{k}", radius=_RADIUS, position=tuple((body + offset).tolist()))
         )
-    distance = _passing_distance(arm, candidates, q)
+    groups = [candidates[k : k + _GROUP] for k in range(0, len(candidates), _GROUP)]
+    passing = [_passing_distance(arm, group, q) for group in groups]
+    distance = np.concatenate([np.zeros(0), *passing])
     clear = np.flatnonzero(distance >= _NEAREST)
     return [candidates[k] for k in clear[np.argsort(distance[clear])][:count]]
 
 
 def _passing_distance(arm: Arm, spheres: list[Sphere], q: Array) -> Array:
-    if not spheres:
-        return np.zeros(0)
     clearance = Clearance(arm, Scene(spheres))
     names = [pair[1] for pair in clearance.pairs]
     smallest = np.min([clearance.distances(row) for row in q], axis=0)

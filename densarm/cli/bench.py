@@ -62,9 +62,10 @@ def step(arm: str, shapes: str, pairs: int, steps: int, json: Path | None) -> in
     The whole `controller.torque` is compared with bare calls of Pinocchio and coal for the
     distances of all pairs (computeJointJacobians, updateGeometryPlacements, computeDistances, rnea)
     in the same states, in turns, while the arm swings to and fro among spheres. Percentiles are
-    of processor time; undisturbed ones of the least time that each state took in its visits. The
-    first call, for which kernels are compiled or loaded from disk when the controller is made, is
-    timed in new processes.
+    of processor time; undisturbed ones of the least time that each state took in its visits,
+    steady ones of steps that follow a step directly, with nothing else in the caches. The first
+    call, for which kernels are compiled or loaded from disk when the controller is made, is timed
+    in new processes.
 
     \b
     Example:
@@ -87,13 +88,18 @@ def step(arm: str, shapes: str, pairs: int, steps: int, json: Path | None) -> in
     for name, times in (
         ("controller.torque", result.step_percentiles_us),
         ("  undisturbed", result.undisturbed_percentiles_us),
+        ("  steady", result.steady_percentiles_us or ()),
         ("bare calls", result.bare_percentiles_us),
     ):
+        if not times:
+            continue
         at = ", ".join(f"{time:.1f}" for time in times)
         click.echo(f"{name:<18} {at} µs at 50, 99, 99.9 %")
     for name, call in (("compiled", first.compiled), ("loaded from disk", first.loaded)):
         made = f"{call.preparation_s:.2f} s before it, kernels {name}"
         click.echo(f"first call         {call.torque_us:.0f} µs, all pairs queried; {made}")
+    click.echo(f"resumed step       {result.resumed_us:.0f} µs, after other work")
+    click.echo(f"core taken away    {result.switches} times")
     click.echo(f"memory growth      {result.memory_growth_kb:.0f} kB")
     click.echo(f"collections        {result.collections}")
     return ExitStatus.SUCCESS

@@ -23,8 +23,10 @@ def test_step_reports_its_keys(command, tmp_path, monkeypatch, arm, pairs):
     assert (data["pairs"], data["steps"]) == (pairs, 250)
     for key in ("step_percentiles_us", "bare_percentiles_us", "undisturbed_percentiles_us"):
         assert 0.0 < data[key][0] <= data[key][1] <= data[key][2]
-    assert min(data["step_us"], data["bare_us"]) > 0.0
-    assert min(data["memory_growth_kb"], data["collections"]) >= 0
+    assert min(data["step_us"], data["bare_us"], data["resumed_us"]) > 0.0
+    assert min(data["memory_growth_kb"], data["collections"], data["switches"]) >= 0
+    steady = data["steady_percentiles_us"]
+    assert steady is None or 0.0 < steady[0] <= steady[1] <= steady[2]
     assert data["ratio"] == pytest.approx(data["step_us"] / data["bare_us"])
     assert f"{data['ratio']:.2f}" in done.out
     assert data["first_calls"]["loaded"] == {"preparation_s": 0.4, "torque_us": 200.0}
