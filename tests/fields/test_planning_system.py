@@ -82,7 +82,7 @@ def test_at_a_sub_goal_without_sight_of_the_next_it_is_stuck(swing_up):
     bound = SweptBound(Clearance(swing_up.arm, swing_up.scene))
     chain = SubGoalChain(bound, path, SensingParameters())
     distance = TorusDistance(swing_up.arm, swing_up.goal)
-    guided = GuidedDensity(bound.clearance, chain, 0.0, DensityParameters(), distance)
+    guided = GuidedDensity(bound, chain, DensityParameters(), distance)
     curve = PlanningSystem(guided, bound).integrate(path.waypoints[0])
     assert not curve.reached
     np.testing.assert_array_equal(curve.q[-1], path.waypoints[1])
