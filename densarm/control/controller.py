@@ -46,16 +46,20 @@ def tracking_error(controller: Controller) -> float:
 
 def checked_state(arm: Arm, q: ArrayLike, v: ArrayLike) -> tuple[Array, Array]:
     """Return q (nq,) and v (nv,) as float arrays; errors as `Controller.torque`."""
-    # Kernels are compiled for arrays that can be written to: copies are, whatever was given.
-    q, v = np.array(q, _FLOAT), np.array(v, _FLOAT)
-    is_shaped = q.shape == (arm.nq,) and v.shape == (arm.nv,)
-    if is_shaped and _is_state(q, v, arm.idx_q, arm.is_circle):
+    q, v = np.ascontiguousarray(q, _FLOAT), np.ascontiguousarray(v, _FLOAT)
+    if not (q.flags.carray and v.flags.carray):  # kernels would be compiled for read-only arrays
+        q, v = q.copy(), v.copy()
+    if q.ndim == v.ndim == 1 and _is_state(q, v, arm.nq, arm.idx_q, arm.is_circle):
         return q, v
     return arm.check_configuration("configuration", q), finite_vector("velocity", v, arm.nv)
 
 
 @compiled
-def _is_state(q: Array, v: Array, idx_q: NDArray[np.int64], is_circle: NDArray[np.bool_]) -> bool:
+def _is_state(
+    q: Array, v: Array, nq: int, idx_q: NDArray[np.int64], is_circle: NDArray[np.bool_]
+) -> bool:
+    if q.size != nq or v.size != idx_q.size:
+        return False
     for i in range(v.size):
         x = q[idx_q[i]]
         if not (math.isfinite(v[i]) and math.isfinite(x)):

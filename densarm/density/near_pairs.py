@@ -79,7 +79,6 @@ class NearPairs:
         self._level = self._pair_numbers[1]
         # Rows: the way gone, its last step, and the least and largest position of slides.
         self._bounds: Array | None = None
-        self._is_placed = False
         self._joint_numbers = np.zeros((4, arm.nv))
         self._joint_numbers[2] = np.where(bound.slides, arm.limits.lower, -np.inf)
         self._joint_numbers[3] = np.where(bound.slides, arm.limits.upper, np.inf)
@@ -109,9 +108,8 @@ class NearPairs:
         if self.state[pair] == _AWAKE:
             return False
         geometry, data = self._geometry, self._geometry_data
-        if not self._is_placed:
+        if not self.state.any():  # shapes were left where they were
             pin.updateGeometryPlacements(self._model, self.data, geometry, data)
-            self._is_placed = True
         data.activateCollisionPair(pair)
         pin.computeDistance(geometry, data, pair)
         if not self._view.is_direct:
@@ -133,7 +131,7 @@ class NearPairs:
         """
         geometry, data = self._geometry, self._geometry_data
         n_awake, n_changed = _wake(q, margin, *self._arrays)
-        self._bounds, self._is_placed = None, n_awake > 0
+        self._bounds = None
         for k in self._pair_states[2, :n_changed].tolist() if n_changed else ():
             if k >= 0:
                 data.activateCollisionPair(k)
