@@ -77,8 +77,8 @@ class NearPairs:
         """σ_k > 0 (K,) [m], which may be changed in place."""
         # After the joints have gone a way s a pair is at least level - lever @ s apart.
         self._level = self._pair_numbers[1]
-        # Rows: the way gone, its last step, and the least and largest position of slides.
         self._bounds: Array | None = None
+        # Rows: the way gone, its last step, and the least and largest position of slides.
         self._joint_numbers = np.zeros((4, arm.nv))
         self._joint_numbers[2] = np.where(bound.slides, arm.limits.lower, -np.inf)
         self._joint_numbers[3] = np.where(bound.slides, arm.limits.upper, np.inf)
