@@ -28,7 +28,7 @@ from densarm.simulation.fixed_step_loop import REACHED_POSITION
 _LIMIT_INSET = 0.2 * REACHED_POSITION
 """Distance from position limits that the motion leaves and reaches its ends at [rad or m]."""
 
-_ATTEMPTS = ((1.0, 0.025), (0.25, 1.0), (0.05, 1.0))
+_ATTEMPTS = ((1.0, 0.01), (0.25, 1.0), (0.05, 1.0))
 """Shares of the path margin and of the planner's iterations, tried in turn: most spaces are wide,
 and a narrow passage may leave less room than wanted."""
 

@@ -171,8 +171,8 @@ def random(
 
     Spheres, boxes, a wall with a gap or a shelf, in proportion to the arm's reach. Starts and
     goals are drawn evenly within the position limits, continuous joints from a whole turn, and
-    touch nothing; a problem is kept if a longer search than the default finds a path. Each is
-    planned, run as a torque-driven closed loop, and proved.
+    touch nothing; a problem is kept if a search of 100,000 samples finds a path that keeps 0.25 %
+    of the reach from contact. Each is planned, run as a torque-driven closed loop, and proved.
 
     The exit status is 0 when all problems were run, whatever was reached.
 

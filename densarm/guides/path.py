@@ -16,7 +16,7 @@ from densarm.validation import non_negative, positive, positive_integer
 class PathGuideParameters:
     """How long and how finely `PathGuide` searches; no clock decides anything."""
 
-    iterations: int = 20_000
+    iterations: int = 50_000
     """Samples that one search draws at most."""
 
     searches: int = 2

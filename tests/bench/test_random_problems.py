@@ -43,6 +43,14 @@ def test_what_no_search_solves_is_not_kept(monkeypatch):
         random_problems("two_link", 1, 0, "spheres")
 
 
+def test_the_path_of_a_problem_that_is_kept_has_room(monkeypatch):
+    """Nothing keeps ten times the reach, whatever is drawn."""
+    monkeypatch.setattr(drawing, "_PATH_ROOM", 10.0)
+    monkeypatch.setattr(drawing, "_SCENES", 3)
+    with pytest.raises(DensarmError, match="no problem with a solution in 3 random scenes"):
+        random_problems("two_link", 1, 0, "spheres")
+
+
 @pytest.mark.parametrize(
     ("arguments", "error"),
     [
