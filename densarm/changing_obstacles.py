@@ -89,6 +89,23 @@ class ChangingObstacles:
         self._spare.append(slot)
         self._note(slot, -1)
 
+    def change_to(self, scene: Scene) -> None:
+        """Act as `Clearance.change_to`."""
+        if scene.attachments != self._attachments:
+            raise InvalidValueError("attached bodies", scene.attachments, "those of the clearance")
+        wanted = {item.name: item for item in scene}
+        for name, slot in list(self._present.items()):
+            if name not in wanted or not slot.can_hold(wanted[name]):
+                self.remove(name)
+        for obstacle in scene:
+            present = self._present.get(obstacle.name)
+            if present is None:
+                self.add(obstacle)
+            elif present.obstacle != obstacle:
+                present.resize(obstacle)
+                present.place(obstacle)
+                self._note(present, 1)
+
     def _slot(self, name: str) -> "_Slot":
         if name not in self._present:
             raise UnknownNameError("obstacle", name, self._present)

@@ -10,10 +10,10 @@ from numpy.typing import ArrayLike, NDArray
 from densarm.arm import Arm
 from densarm.arrays import Array
 from densarm.changing_obstacles import ChangingObstacles
-from densarm.compiled import compiled
 from densarm.distance_view import DistanceView
 from densarm.errors import InvalidValueError, SceneChangedError
 from densarm.obstacles import Obstacle, geometry_objects
+from densarm.pair_gradients import write_pair_gradients
 from densarm.scene import Scene
 
 COAL_TOLERANCE = 1e-10
@@ -50,7 +50,8 @@ class Clearance:
     Obstacles can be moved, added and removed between queries, at a cost that does not grow with
     the scene. Room for those to come is made beforehand: a spare obstacle stands for any of its
     shape and size, a spare sphere or capsule for those of any size. What finds no spare one needs
-    a new clearance, made apart from the control loop: that takes milliseconds.
+    a new clearance with more room and a new controller, which take milliseconds: made apart from
+    the control loop, `change_to` brings them up to date between two steps.
 
     Args:
         arm: the arm; its collision model holds the self-collision pairs.
@@ -160,6 +161,22 @@ class Clearance:
         self._obstacles.remove(name)
         self._skip_spare_pairs()
 
+    def change_to(self, scene: Scene) -> None:
+        """Move, add and remove obstacles until they are those of a scene.
+
+        It brings a clearance with more room, which was made meanwhile, up to date with the one
+        that a control loop uses.
+
+        Args:
+            scene: the obstacles; its attached bodies are those of the clearance.
+
+        Raises:
+            InvalidValueError: other attached bodies, or no spare obstacle for one that is new; the
+                obstacles before it are changed then.
+        """
+        self._obstacles.change_to(scene)
+        self._skip_spare_pairs()
+
     def _skip_spare_pairs(self) -> None:
         is_spare = self.changes < 0
         for k in np.flatnonzero(is_spare != self._is_spare).tolist():
@@ -189,7 +206,7 @@ class Clearance:
         )
         if self.n_pairs:
             pin.computeDistances(self.geometry_model, self.geometry_data)
-            _pair_gradients(
+            write_pair_gradients(
                 self._view.read(), self._jacobian, self.sign, self.distance, self.gradient
             )
         if self._has_spare:
@@ -252,43 +269,3 @@ def _geometry_model(arm: Arm, scene: Scene) -> pin.GeometryModel:
         for k in moving:
             model.addCollisionPair(pin.CollisionPair(int(k), int(index)))
     return model
-
-
-@compiled
-def _pair_gradients(
-    rows: Array, jacobian: Array, sign: Array, distance: Array, gradient: Array
-) -> None:
-    for k in range(rows.shape[0]):
-        distance[k] = rows[k, 0]
-        for j in range(sign.shape[1]):
-            gradient[k, j] = 0.0
-        add_pair_gradient(rows[k], jacobian, sign[k], 1.0, gradient[k])
-
-
-@compiled
-def add_pair_gradient(row: Array, jacobian: Array, sign: Array, factor: float, out: Array) -> None:
-    """Add a multiple of the gradient of one distance in place.
-
-    Args:
-        row: [distance, normal, point 1, point 2], as `DistanceView` has it (10,).
-        jacobian: world-frame joint Jacobian (6, nv).
-        sign: S_2 - S_1 (nv,).
-        factor: of the gradient.
-        out: added to (nv,).
-    """
-    nx, ny, nz = row[1], row[2], row[3]
-    px, py, pz = row[4], row[5], row[6]
-    mx, my, mz = py * nz - pz * ny, pz * nx - px * nz, px * ny - py * nx
-    for j in range(sign.shape[0]):
-        if sign[j] != 0.0:
-            out[j] += factor * (
-                sign[j]
-                * (
-                    nx * jacobian[0, j]
-                    + ny * jacobian[1, j]
-                    + nz * jacobian[2, j]
-                    + mx * jacobian[3, j]
-                    + my * jacobian[4, j]
-                    + mz * jacobian[5, j]
-                )
-            )

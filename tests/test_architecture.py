@@ -34,7 +34,7 @@ LAYERS = (
     ("scene_files",),
     ("arm",),
     ("holding_torque", "joint_torques", "rigid_body"),
-    ("distance_view", "changing_obstacles", "clearance"),
+    ("distance_view", "pair_gradients", "changing_obstacles", "clearance"),
     ("proof", "clear_configurations"),
     ("density",),
     ("guides",),

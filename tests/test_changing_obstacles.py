@@ -1,5 +1,8 @@
 """A clearance whose obstacles changed is that of the scene as it is then."""
 
+from dataclasses import replace
+from threading import Thread
+
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -7,6 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from densarm.arm import load_arm
+from densarm.attachment import Attachment
 from densarm.clearance import Clearance
 from densarm.control.density_tracking import DensityTracking
 from densarm.control.gains import Gains
@@ -33,6 +37,8 @@ SPARE = (
     Capsule(name="spare bar", radius=0.01, length=0.1),
     Box(name="spare box", size=(0.1, 0.1, 0.1)),
 )
+LARGE = (Box(name="large", size=(1.0, 1.0, 1.0), position=(0.0, 0.0, 3.0)),)
+MORE = tuple(replace(item, name=f"more {item.name}") for item in SPARE)
 PLACE = st.tuples(*[st.floats(-0.8, 0.8)] * 3)
 SIZE = st.floats(0.02, 0.2)
 NEW = st.one_of(
@@ -107,6 +113,68 @@ def test_who_sleeps_is_out_of_reach_of_what_changed(changes, seed):
             assert (exact[asleep] > 0.05).all()
             np.testing.assert_allclose(pairs.distance[~asleep], exact[~asleep], rtol=0, atol=1e-8)
             assert asleep[clearance.changes < 0].all()
+
+
+@settings(max_examples=12)
+@given(changes=CHANGES)
+def test_a_clearance_made_meanwhile_is_brought_up_to_date(changes):
+    running, larger = make(), Clearance(ARM, Scene([BALL, TABLE]), (*SPARE, *MORE))
+    for what in changes:
+        change(running, what)
+    larger.change_to(running.scene)
+    check_is_that_of_its_scene(larger, READY)
+    assert set(larger.scene) == set(running.scene)
+    larger.change_to(Scene([BALL, TABLE]))
+    larger.change_to(Scene([BALL, TABLE]))
+    check_is_that_of_its_scene(larger, READY)
+    assert set(larger.scene) == {BALL, TABLE}
+
+
+def test_changing_to_a_scene_costs_its_differences():
+    clearance = make()
+    before = clearance.version
+    clearance.change_to(Scene([replace(TABLE, position=(0, 0, -1)), BALL]))
+    assert clearance.version == before + 1
+    with pytest.raises(InvalidValueError, match="spare obstacle"):
+        clearance.change_to(Scene([BALL, TABLE, *MORE, *LARGE]))
+    with pytest.raises(InvalidValueError, match="attached bodies"):
+        clearance.change_to(Scene([BALL], [Attachment(LARGE[0], "panda_hand")]))
+
+
+def hold(clearance: Clearance) -> DensityTracking:
+    """A controller that holds the arm at rest."""
+    density = NavigationDensity(
+        [NearClearanceSet(NearPairs(SweptBound(clearance)), 0.0, 0.1), JointLimitSet(ARM, 0.05)],
+        TorusDistance(ARM, READY),
+        DensityParameters(),
+    )
+    reference = Reference(0.001, np.tile(ARM.angles(READY), (2, 1)), np.zeros((2, ARM.nv)))
+    return DensityTracking(ARM, density, reference, Gains(position=25.0, velocity=15.0))
+
+
+def test_a_controller_with_more_room_takes_over_between_two_steps():
+    """Made in a thread; the arm does not notice, until something comes that had no room."""
+    near = Sphere(name="ball", radius=0.1, position=(0.35, 0.25, 0.6))
+    running, made = Clearance(ARM, Scene([near])), []
+    controller, alone = hold(running), hold(Clearance(ARM, Scene([near])))
+
+    def make_room(scene: Scene) -> None:
+        larger = Clearance(ARM, scene, [Sphere(name="spare", radius=0.1)])
+        made.append((larger, hold(larger)))
+
+    thread = Thread(target=make_room, args=[running.scene])
+    thread.start()
+    running.move_obstacle("ball", (0.35, 0.25, 0.61))
+    thread.join()
+    alone = hold(Clearance(ARM, running.scene))
+    larger, controller = made[0]
+    larger.change_to(running.scene)
+    v = 0.1 * np.ones(ARM.nv)
+    for k in range(20):
+        q = ARM.integrate(READY, 0.002 * k * v)
+        np.testing.assert_array_equal(controller.torque(0.0, q, v), alone.torque(0.0, q, v))
+    larger.add_obstacle(Sphere(name="new", radius=0.1, position=(0.35, -0.25, 0.6)))
+    assert (controller.torque(0.0, q, v) != alone.torque(0.0, q, v)).any()
 
 
 def test_every_pair_of_a_moved_obstacle_wakes():

@@ -6,10 +6,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from densarm.arrays import Array
-from densarm.clearance import add_pair_gradient
 from densarm.compiled import compiled
 from densarm.density.inverse_bump import log_inverse_bump
 from densarm.density.near_pairs import NearPairs
+from densarm.pair_gradients import add_pair_gradient
 from densarm.validation import non_negative, positive_array
 
 
