@@ -1,0 +1,27 @@
+"""Room is made beside a loop, and what that costs is told."""
+
+import json
+import runpy
+import sys
+from pathlib import Path
+
+import pytest
+
+BENCHMARKS = Path(__file__).parents[2] / "benchmarks"
+
+
+@pytest.fixture
+def script(monkeypatch):
+    monkeypatch.syspath_prepend(str(BENCHMARKS))
+    interval = sys.getswitchinterval()
+    yield runpy.run_path(str(BENCHMARKS / "more_room.py"))
+    sys.setswitchinterval(interval)
+
+
+def test_making_and_swapping_are_timed(script, tmp_path, capsys):
+    file = tmp_path / "room.json"
+    script["main"](["--pairs", "32", "--intervals", "0.001", "--rounds", "1", "--json", str(file)])
+    (row,) = json.loads(file.read_text())["rows"]
+    assert (row["pairs"], row["switch_interval_ms"]) == (32, 1.0)
+    assert min(row[key]["median"] for key in script["KEYS"]) > 0.0
+    assert "32 pairs, switch 1.0 ms" in capsys.readouterr().out
