@@ -170,14 +170,14 @@ def _wake(
     wakes_all = not _go(q, q_last, idx_q, is_circle, joint_numbers)
     n_awake, n_changed = 0, 0
     for k in range(state.shape[0]):
-        gone = _motion(lever[k], joint_numbers[0])
-        reach = margin + sensing_distance[k] + 2.0 * DISTANCE_TOLERANCE
         before = state[k]
         if changes[k] < 0:  # spare
             state[k], level[k] = _ASLEEP, np.inf
         elif changes[k] != seen[k] or wakes_all:
             state[k] = _AWAKE
         else:
+            gone = _motion(lever[k], joint_numbers[0])
+            reach = margin + sensing_distance[k] + 2.0 * DISTANCE_TOLERANCE
             if before == _AWAKE:
                 level[k] = rows[k, 0] + (gone - _motion(lever[k], joint_numbers[1]))
             # A sleep of a few steps saves nothing, but pairs that close to their reach are few.
