@@ -35,6 +35,9 @@ and a narrow passage may leave less room than wanted."""
 _END_SHARE = 0.5
 """Share of the clearance at start and goal that a path's margin may take."""
 
+_SMOOTH_SHARE = 0.5
+"""Share of a path's or curve's room beyond the margin that the smooth path keeps."""
+
 _STOP_SHARE = 0.5
 """Share of the smooth path's room that brakes keep too; the rest is for tracking errors."""
 
@@ -91,7 +94,7 @@ def plan_motion(
     start, goal, control = scenario.start, scenario.goal, scenario.control
     bound = SweptBound(clearance, control.margin)
     depart, arrive = (_inside_limits(bound, q) for q in (start, goal))
-    ends = min(bound.slack(q).min(initial=np.inf) for q in (start, depart, arrive))
+    ends = _least_slack(bound, np.stack([start, depart, arrive]))
     room = max(0.0, _END_SHARE * ends)
     began = time.perf_counter()
     # Of attempts with the same margin the last counts, which is the most thorough.
@@ -107,10 +110,12 @@ def plan_motion(
     plan = MotionPlan(scenario, path, bound, guide_time=time.perf_counter() - began)
     if control.form != ControlForm.TRACKING:
         return plan
-    kept = 0.5 * (path_bound.margin - control.margin) if path.is_clear else 0.0
+    curve = np.vstack([start, _curve(plan)])
+    kept = _SMOOTH_SHARE * (path_bound.margin - control.margin)
+    if not path.is_clear:  # nor is the curve, but its steps are a share of its clearance
+        kept = max(0.0, min(kept, _SMOOTH_SHARE * _least_slack(bound, curve)))
     smooth_bound = bound.with_margin(control.margin + kept)
     stop_bound = bound.with_margin(control.margin + _STOP_SHARE * kept)
-    curve = np.vstack([start, _curve(plan)])
     reference = _reference(scenario, smooth_bound, stop_bound, curve)
     if reference is None:
         return NoPath("no smooth path near the planning system's curve is proved clear")
@@ -134,6 +139,11 @@ def _curve(plan: MotionPlan) -> Array:
         if returned.reached:
             return returned.q[::-1]
     return curve.q
+
+
+def _least_slack(bound: SweptBound, q: Array) -> float:
+    """Return by how much the distances at configurations (N, nq) exceed the margin at least [m]."""
+    return min(float(bound.slack(row).min(initial=np.inf)) for row in q)
 
 
 def _chosen(

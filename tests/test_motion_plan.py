@@ -135,3 +135,16 @@ def test_feedback_keeps_its_own_alpha(swing_up, form):
     plan = planned(swing_up, GuideKind.DIRECT, form)
     wanted = 10.0 if form == ControlForm.TRACKING else swing_up.density.alpha
     assert plan.guided.density.parameters.alpha == wanted
+
+
+def test_a_smooth_path_keeps_half_the_room_of_its_curve():
+    wall = densarm.Box(name="wall", size=(0.1, 1.0, 0.3))
+    scenario = among([wall], (0.3, 0.2), (-0.6, 0.9))
+    scenario = replace(scenario, control=replace(scenario.control, path_margin=0.04))
+    plan = planned(scenario, GuideKind.DIRECT)
+    curve = PlanningSystem(plan.guided, plan.bound).integrate(plan.path.waypoints[0]).q
+    curve_room, room = (
+        min(plan.bound.slack(q).min() for q in points)
+        for points in (curve, plan.reference.position)
+    )
+    assert room >= 0.5 * min(0.04, curve_room)
