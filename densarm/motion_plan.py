@@ -110,12 +110,18 @@ def plan_motion(
     plan = MotionPlan(scenario, path, bound, guide_time=time.perf_counter() - began)
     if control.form != ControlForm.TRACKING:
         return plan
-    curve = np.vstack([start, _curve(plan)])
-    kept = _SMOOTH_SHARE * (path_bound.margin - control.margin)
+    return _with_reference(plan, path_bound.margin - control.margin)
+
+
+def _with_reference(plan: MotionPlan, room: float) -> MotionPlan | NoPath:
+    """Return a plan with its reference, its path having kept so much room beyond the margin [m]."""
+    scenario, bound, path = plan.scenario, plan.bound, plan.path
+    curve = np.vstack([scenario.start, _curve(plan)])
+    kept = _SMOOTH_SHARE * room
     if not path.is_clear:  # nor is the curve, but its steps are a share of its clearance
         kept = max(0.0, min(kept, _SMOOTH_SHARE * _least_slack(bound, curve)))
-    smooth_bound = bound.with_margin(control.margin + kept)
-    stop_bound = bound.with_margin(control.margin + _STOP_SHARE * kept)
+    smooth_bound = bound.with_margin(bound.margin + kept)
+    stop_bound = bound.with_margin(bound.margin + _STOP_SHARE * kept)
     reference = _reference(scenario, smooth_bound, stop_bound, curve)
     if reference is None:
         return NoPath("no smooth path near the planning system's curve is proved clear")
