@@ -11,6 +11,7 @@ from densarm.arrays import Array
 from densarm.clearance import Clearance
 from densarm.density.goal_distance import GoalDistance, TorusDistance
 from densarm.density.inertia_distance import InertiaDistance
+from densarm.density.navigation_density import DensityParameters
 from densarm.fields.guided_density import GuidedDensity
 from densarm.fields.planning_system import PlanningSystem
 from densarm.fields.sub_goal_chain import SubGoalChain
@@ -59,20 +60,23 @@ class MotionPlan:
 
     @cached_property
     def guided(self) -> GuidedDensity:
-        """The density along the sub-goals."""
-        scenario, density = self.scenario, self.scenario.density
-        if scenario.control.form == ControlForm.TRACKING:
-            density = replace(density, alpha=scenario.control.planning_alpha)
-        return GuidedDensity(
-            self.bound,
-            SubGoalChain(self.bound, self.path, scenario.sensing),
-            density,
-            _goal_distance(scenario),
-        )
+        """The density along the sub-goals, for feedback on it."""
+        return self._guided(self.scenario.density)
+
+    @cached_property
+    def planned(self) -> GuidedDensity:
+        """The density along the sub-goals, for a curve of its planning system that is tracked."""
+        alpha = self.scenario.control.planning_alpha
+        return self._guided(replace(self.scenario.density, alpha=alpha))
+
+    def _guided(self, parameters: DensityParameters) -> GuidedDensity:
+        chain = SubGoalChain(self.bound, self.path, self.scenario.sensing)
+        return GuidedDensity(self.bound, chain, parameters, _goal_distance(self.scenario))
 
     def describe_stall(self, q: Array) -> str:
-        """As `GuidedDensity.describe_stall`."""
-        return self.guided.describe_stall(q)
+        """As `GuidedDensity.describe_stall`, of the density that led the arm to q (nq,)."""
+        is_tracked = self.scenario.control.form == ControlForm.TRACKING
+        return (self.planned if is_tracked else self.guided).describe_stall(q)
 
 
 def plan_motion(
@@ -137,11 +141,11 @@ def _curve(plan: MotionPlan) -> Array:
     path = plan.path
     if path.is_clear:
         return path.waypoints
-    curve = PlanningSystem(plan.guided, plan.bound).integrate(path.waypoints[0])
+    curve = PlanningSystem(plan.planned, plan.bound).integrate(path.waypoints[0])
     if not curve.reached:
         # A goal lies in narrow space more often than a start, and leaving is easier than entering.
         back = replace(plan, path=GuidePath(path.waypoints[::-1], is_clear=False))
-        returned = PlanningSystem(back.guided, plan.bound).integrate(path.waypoints[-1])
+        returned = PlanningSystem(back.planned, plan.bound).integrate(path.waypoints[-1])
         if returned.reached:
             return returned.q[::-1]
     return curve.q

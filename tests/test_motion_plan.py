@@ -102,7 +102,7 @@ def test_stuck_from_the_start_it_comes_back_from_the_goal():
     for start, goal in ((beside, behind), (behind, beside)):
         plan = planned(among([wall], start, goal), GuideKind.DIRECT)
         np.testing.assert_allclose(plan.reference.position[[0, -1]], [start, goal], atol=1e-9)
-        curve = PlanningSystem(plan.guided, plan.bound).integrate(plan.path.waypoints[0])
+        curve = PlanningSystem(plan.planned, plan.bound).integrate(plan.path.waypoints[0])
         assert curve.reached == (start == behind)
 
 
@@ -113,7 +113,7 @@ def test_stuck_from_both_ends_it_goes_where_the_start_leads():
         densarm.Box(name="lower", size=(0.5, 0.1, 0.3), position=(0.2, -0.45, 0.0)),
     ]
     plan = planned(among(cap, (-0.7, 0.0), (0.25, 0.0)), GuideKind.DIRECT)
-    curve = PlanningSystem(plan.guided, plan.bound).integrate(plan.path.waypoints[0])
+    curve = PlanningSystem(plan.planned, plan.bound).integrate(plan.path.waypoints[0])
     assert not curve.reached
     np.testing.assert_allclose(plan.reference.position[-1], curve.q[-1], atol=1e-9)
 
@@ -130,11 +130,10 @@ def test_a_larger_alpha_leads_through_a_narrower_gap(planning_alpha, passes):
     assert (plan.reference.position[-1, 0] > 0.0) == passes
 
 
-@pytest.mark.parametrize("form", ControlForm)
-def test_feedback_keeps_its_own_alpha(swing_up, form):
-    plan = planned(swing_up, GuideKind.DIRECT, form)
-    wanted = 10.0 if form == ControlForm.TRACKING else swing_up.density.alpha
-    assert plan.guided.density.parameters.alpha == wanted
+def test_feedback_keeps_its_own_alpha(swing_up):
+    plan = planned(swing_up, GuideKind.DIRECT)
+    assert plan.guided.density.parameters.alpha == swing_up.density.alpha
+    assert plan.planned.density.parameters.alpha == swing_up.control.planning_alpha
 
 
 def test_a_smooth_path_keeps_half_the_room_of_its_curve():
@@ -142,7 +141,7 @@ def test_a_smooth_path_keeps_half_the_room_of_its_curve():
     scenario = among([wall], (0.3, 0.2), (-0.6, 0.9))
     scenario = replace(scenario, control=replace(scenario.control, path_margin=0.04))
     plan = planned(scenario, GuideKind.DIRECT)
-    curve = PlanningSystem(plan.guided, plan.bound).integrate(plan.path.waypoints[0]).q
+    curve = PlanningSystem(plan.planned, plan.bound).integrate(plan.path.waypoints[0]).q
     curve_room, room = (
         min(plan.bound.slack(q).min() for q in points)
         for points in (curve, plan.reference.position)
