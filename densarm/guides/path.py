@@ -23,7 +23,8 @@ class PathGuideParameters:
     """Searches from scratch, each with its own seed, before giving up."""
 
     extension: float = 1.0
-    """Longest edge that a search adds to its trees [rad or m]."""
+    """Longest edge that the first search adds to its trees; the second adds edges up to twice as
+    long, and so on, as neither suits all spaces [rad or m]."""
 
     shortcuts: int = 100
     """Shortcuts tried on a path that was found."""
@@ -83,7 +84,7 @@ class PathGuide:
 
         p = self._parameters
         bounds = self._bounds(start, goal)
-        for _ in range(p.searches):
+        for search in range(1, p.searches + 1):
             path = rrt_connect(
                 self._arm,
                 self._freedom,
@@ -91,7 +92,7 @@ class PathGuide:
                 goal,
                 bounds=bounds,
                 iterations=p.iterations,
-                extension=p.extension,
+                extension=search * p.extension,
                 seed=int(rng.integers(1, 2**31)),
             )
             if path is not None:
