@@ -97,6 +97,29 @@ def test_an_enclosed_goal_has_no_path(arm, make_discs, enclosure):
     assert "100 iterations" in answer.reason
 
 
+def test_later_searches_add_longer_edges(arm, make_discs, enclosure):
+    class Watched:
+        def __init__(self):
+            self.world, self.longest = make_discs(arm, *enclosure), []
+
+        def configuration_is_clear(self, q):
+            return self.world.configuration_is_clear(q)
+
+        def segment_is_clear(self, q_a, q_b):
+            self.longest.append(float(np.linalg.norm(arm.difference(q_a, q_b))))
+            return self.world.segment_is_clear(q_a, q_b)
+
+    watched = Watched()
+    parameters = PathGuideParameters(iterations=100, searches=2, extension=0.3)
+    ends = arm.configuration([-2.0, 0.0]), arm.configuration([0.0, 0.0])
+    PathGuide(arm, watched, parameters).plan(*ends, 0)
+    lengths = np.array(watched.longest[1:])
+    later = np.flatnonzero(lengths > 0.31)
+    assert lengths.max() <= 0.6 + 1e-9
+    assert (lengths[: later[0]] <= 0.3 + 1e-9).all()
+    assert later[0] > 50
+
+
 def test_an_end_in_contact_is_named(arm, wall):
     free, blocked = arm.configuration([-1.5, 0.0]), arm.configuration([0.0, 0.0])
     guide = PathGuide(arm, wall)
