@@ -20,6 +20,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from timing.priority import add_fifo_option, take_priority
 from timing.spread import Spread
 from timing.surroundings import print_surroundings, surroundings
 
@@ -166,11 +167,11 @@ def main(arguments: list[str] | None = None) -> None:
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("--steps", type=int, default=1_000_000)
     parser.add_argument("--pairs", type=int, default=256)
-    parser.add_argument("--fifo", action="store_true", help="real-time priority, where allowed")
+    add_fifo_option(parser)
     parser.add_argument("--json", type=Path)
     options = parser.parse_args(arguments)
     if options.fifo:
-        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(10))
+        take_priority()
     around = surroundings(["pin", "coal", "numpy", "numba"])
     print_surroundings(around)
     found = report(*run(options.steps, options.pairs))

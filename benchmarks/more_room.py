@@ -9,29 +9,27 @@ interval, or when a call of Pinocchio or coal returns, none of which is interrup
 """
 
 import argparse
-import os
 import sys
 import time
 from pathlib import Path
 from threading import Thread
 from typing import Any
 
+from timing.priority import add_fifo_option, take_priority
 from timing.spread import Spread
 from timing.surroundings import print_surroundings, surroundings
 
 from densarm.arm import load_arm
-from densarm.bench.step import full_sensing_density
+from densarm.bench.step import full_sensing_controller
 from densarm.bench.swing_among_spheres import clearance_among_spheres, swing
 from densarm.clearance import Clearance
 from densarm.cli.json_file import write_json
 from densarm.control.density_tracking import DensityTracking
-from densarm.control.gains import Gains
 from densarm.reference.reference import Reference
 from densarm.scene import Scene, Sphere
 
 PERIOD = 0.001  # [s]
 STEPS = 200  # with the thread, and as many without
-SHAPES = 16  # of Panda, each a pair with a sphere
 
 
 class Loop:
@@ -43,7 +41,7 @@ class Loop:
         self.states = list(
             zip(arm.configurations(reference.position), reference.velocity, strict=True)
         )
-        self.controller = controller_of(clearance, reference)
+        self.controller = full_sensing_controller(clearance, reference)
 
     def step(self, k: int) -> None:
         self.controller.torque(k * PERIOD, *self.states[k % len(self.states)])
@@ -59,11 +57,6 @@ class Loop:
         return late
 
 
-def controller_of(clearance: Clearance, reference: Reference) -> DensityTracking:
-    goal = clearance.arm.configuration(reference.position[-1])
-    return DensityTracking(clearance.arm, full_sensing_density(clearance, goal), reference, Gains())
-
-
 def measure(pairs: int, interval: float, rounds: int) -> dict[str, Any]:
     """Measure with so many pairs in the end, half of them spare."""
     sys.setswitchinterval(interval)
@@ -77,7 +70,7 @@ def measure(pairs: int, interval: float, rounds: int) -> dict[str, Any]:
     def make(loop: Loop, scene: Scene) -> None:
         began = time.thread_time()
         larger = Clearance(arm, scene, spare)
-        controller = controller_of(larger, reference)
+        controller = full_sensing_controller(larger, reference)
         controller.torque(0.0, *loop.states[-1])  # so that pairs sleep that are far from there
         made.append((larger, controller))
         found["making_ms"].append(1e3 * (time.thread_time() - began))
@@ -120,11 +113,11 @@ def main(arguments: list[str] | None = None) -> None:
     parser.add_argument("--pairs", type=int, nargs="*", default=[64, 256, 1024])
     parser.add_argument("--intervals", type=float, nargs="*", default=[0.005, 0.0001])
     parser.add_argument("--rounds", type=int, default=10)
-    parser.add_argument("--fifo", action="store_true", help="real-time priority, where allowed")
+    add_fifo_option(parser)
     parser.add_argument("--json", type=Path)
     options = parser.parse_args(arguments)
     if options.fifo:
-        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(10))
+        take_priority()
     around = surroundings(["pin", "coal", "numpy", "numba"])
     print_surroundings(around)
     print("medians and largest of the rounds; late: the latest of 200 steps")

@@ -77,10 +77,8 @@ class ChangingObstacles:
             raise InvalidValueError("obstacle", obstacle, allowed)
         self._spare.remove(slot)
         self._present[obstacle.name] = slot
-        slot.resize(obstacle)
-        slot.place(obstacle)
         self._pairs = None
-        self._note(slot, 1)
+        self._fill(slot, obstacle)
 
     def remove(self, name: str) -> None:
         """Act as `Clearance.remove_obstacle`."""
@@ -102,9 +100,12 @@ class ChangingObstacles:
             if present is None:
                 self.add(obstacle)
             elif present.obstacle != obstacle:
-                present.resize(obstacle)
-                present.place(obstacle)
-                self._note(present, 1)
+                self._fill(present, obstacle)
+
+    def _fill(self, slot: "_Slot", obstacle: Obstacle) -> None:
+        slot.resize(obstacle)
+        slot.place(obstacle)
+        self._note(slot, 1)
 
     def _slot(self, name: str) -> "_Slot":
         if name not in self._present:

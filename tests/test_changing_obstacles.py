@@ -141,14 +141,13 @@ def test_changing_to_a_scene_costs_its_differences():
         clearance.change_to(Scene([BALL], [Attachment(LARGE[0], "panda_hand")]))
 
 
-def hold(clearance: Clearance) -> DensityTracking:
+def hold(clearance: Clearance, q: np.ndarray, sensing: float) -> DensityTracking:
     """A controller that holds the arm at rest."""
+    near = NearClearanceSet(NearPairs(SweptBound(clearance)), 0.0, sensing)
     density = NavigationDensity(
-        [NearClearanceSet(NearPairs(SweptBound(clearance)), 0.0, 0.1), JointLimitSet(ARM, 0.05)],
-        TorusDistance(ARM, READY),
-        DensityParameters(),
+        [near, JointLimitSet(ARM, 0.05)], TorusDistance(ARM, q), DensityParameters()
     )
-    reference = Reference(0.001, np.tile(ARM.angles(READY), (2, 1)), np.zeros((2, ARM.nv)))
+    reference = Reference(0.001, np.tile(ARM.angles(q), (2, 1)), np.zeros((2, ARM.nv)))
     return DensityTracking(ARM, density, reference, Gains(position=25.0, velocity=15.0))
 
 
@@ -156,17 +155,16 @@ def test_a_controller_with_more_room_takes_over_between_two_steps():
     """Made in a thread; the arm does not notice, until something comes that had no room."""
     near = Sphere(name="ball", radius=0.1, position=(0.35, 0.25, 0.6))
     running, made = Clearance(ARM, Scene([near])), []
-    controller, alone = hold(running), hold(Clearance(ARM, Scene([near])))
 
     def make_room(scene: Scene) -> None:
         larger = Clearance(ARM, scene, [Sphere(name="spare", radius=0.1)])
-        made.append((larger, hold(larger)))
+        made.append((larger, hold(larger, READY, 0.1)))
 
     thread = Thread(target=make_room, args=[running.scene])
     thread.start()
     running.move_obstacle("ball", (0.35, 0.25, 0.61))
     thread.join()
-    alone = hold(Clearance(ARM, running.scene))
+    alone = hold(Clearance(ARM, running.scene), READY, 0.1)
     larger, controller = made[0]
     larger.change_to(running.scene)
     v = 0.1 * np.ones(ARM.nv)
@@ -193,13 +191,7 @@ def test_every_pair_of_a_moved_obstacle_wakes():
 def test_an_arm_waits_for_a_ball_to_leave_in_a_loop_of_ones_own():
     clearance = Clearance(ARM, Scene(), [Sphere(name="spare", radius=0.05)])
     goal = ARM.angles(READY) + np.eye(ARM.nv)[0]
-    reference = Reference(0.001, np.tile(goal, (2, 1)), np.zeros((2, ARM.nv)))
-    density = NavigationDensity(
-        [NearClearanceSet(NearPairs(SweptBound(clearance)), 0.0, 0.05), JointLimitSet(ARM, 0.05)],
-        TorusDistance(ARM, ARM.configuration(goal)),
-        DensityParameters(),
-    )
-    controller = DensityTracking(ARM, density, reference, Gains(position=25.0, velocity=15.0))
+    controller = hold(clearance, ARM.configuration(goal), 0.05)
     data, q, v, nearest, waited = ARM.model.createData(), READY, np.zeros(ARM.nv), 1.0, 0.0
     middle = ARM.configuration(ARM.angles(READY) + 0.7 * np.eye(ARM.nv)[0])
     pin.framesForwardKinematics(ARM.model, data, middle)

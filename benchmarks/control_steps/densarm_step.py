@@ -2,9 +2,7 @@
 
 from control_steps.task import ControlTask
 from densarm.arrays import Array
-from densarm.bench.step import full_sensing_density
-from densarm.control.density_tracking import DensityTracking
-from densarm.control.gains import Gains
+from densarm.bench.step import full_sensing_controller
 from densarm.fields.sub_goal_chain import SensingParameters
 
 
@@ -13,10 +11,8 @@ class DensarmStep:
 
     def __init__(self, task: ControlTask) -> None:
         self._task = task
-        arm, sensing = task.arm, SensingParameters()
-        goal = arm.configuration(task.reference.position[-1])
-        density = full_sensing_density(task.clearance, goal)
-        self._controller = DensityTracking(arm, density, task.reference, Gains())
+        sensing = SensingParameters()
+        self._controller = full_sensing_controller(task.clearance, task.reference)
         self.name = "densarm"
         self.set_up = (
             f"DensityTracking.torque, sensing distance {1e3 * sensing.distance:.0f} mm; joint,"

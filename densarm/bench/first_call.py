@@ -12,10 +12,8 @@ from typing import Any
 import numpy as np
 
 from densarm.arm import load_arm
-from densarm.bench.step import full_sensing_density
+from densarm.bench.step import full_sensing_controller
 from densarm.bench.swing_among_spheres import clearance_among_spheres, swing
-from densarm.control.density_tracking import DensityTracking
-from densarm.control.gains import Gains
 
 
 @dataclass(frozen=True)
@@ -74,8 +72,7 @@ def _time_first_call(name: str, shapes: str, pairs: int) -> FirstCall:
     clearance = clearance_among_spheres(arm, reference, pairs)
     q, v = arm.configurations(reference.position[:1])[0], np.zeros(arm.nv)
     began = time.perf_counter()
-    density = full_sensing_density(clearance, arm.configuration(reference.position[-1]))
-    controller = DensityTracking(arm, density, reference, Gains())
+    controller = full_sensing_controller(clearance, reference)
     made = time.perf_counter()
     controller.torque(0.0, q, v)
     called = time.perf_counter()

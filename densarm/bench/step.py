@@ -105,8 +105,7 @@ def time_step(arm: str, shapes: str = "hull", pairs: int = 64, steps: int = 20_0
     loaded = load_arm(arm, shapes=shapes)
     reference = swing(loaded)
     clearance = clearance_among_spheres(loaded, reference, pairs)
-    density = full_sensing_density(clearance, loaded.configuration(reference.position[-1]))
-    step = DensityTracking(loaded, density, reference, Gains()).torque
+    step = full_sensing_controller(clearance, reference).torque
     bare, states = _bare_calls(clearance), _states(loaded, reference)
     turns, record = (step, bare), np.full((2, 3, steps), np.nan)  # pages are touched here
     warm_up = np.empty((3, _BLOCK))
@@ -198,6 +197,18 @@ def _peak_memory() -> float:
 
 def _collections() -> int:
     return sum(generation["collections"] for generation in gc.get_stats())
+
+
+def full_sensing_controller(clearance: Clearance, reference: Reference) -> DensityTracking:
+    """Return the controller that is timed.
+
+    Args:
+        clearance: its pairs.
+        reference: what it tracks.
+    """
+    arm = clearance.arm
+    density = full_sensing_density(clearance, arm.configuration(reference.position[-1]))
+    return DensityTracking(arm, density, reference, Gains())
 
 
 def full_sensing_density(clearance: Clearance, goal: Array) -> NavigationDensity[TorusDistance]:

@@ -103,8 +103,11 @@ def _segment_is_clear(
 ) -> bool:
     """Prove all pairs, those first that were not clear lately."""
     joint_poses, poses = np.empty((3, parent.size, 12)), np.empty((3, joint.size, 12))
-    for k in range(poses.size):  # entry by entry: a slice compiles for seconds
-        poses.flat[k] = frame.flat[k % frame.size]
+    for shape in range(joint.size):
+        if joint[shape] == 0:  # `place` leaves what no joint moves as it is
+            for side in range(3):
+                for k in range(12):  # entry by entry: a slice compiles for seconds
+                    poses[side, shape, k] = frame[shape, k]
     bounds, is_asked = np.empty((2, joint.size, parent.size)), np.empty(joint.size, np.bool_)
     longest = 0.0
     for rate in step:
