@@ -163,7 +163,7 @@ class Arm:
         Returns:
             q_to ⊖ q_from [rad or m]; the short way round on continuous joints.
         """
-        delta = self.angles(q_to) - self.angles(q_from)
+        delta = self.angles(q_to) - self.angles(q_from) if self._circles else q_to - q_from
         for joint in self._circles:
             turn = delta[..., joint]
             delta[..., joint] = np.arctan2(np.sin(turn), np.cos(turn))

@@ -31,7 +31,8 @@ _LIMIT_INSET = 0.2 * REACHED_POSITION
 
 _ATTEMPTS = ((1.0, 0.01), (0.25, 1.0), (0.05, 1.0))
 """Shares of the path margin and of the planner's iterations, tried in turn: most spaces are wide,
-and a narrow passage may leave less room than wanted."""
+and a narrow passage may leave less room than wanted. Where not all are to be spent, all that are
+draw samples near both ends."""
 
 _END_SHARE = 0.5
 """Share of the clearance at start and goal that a path's margin may take."""
@@ -163,9 +164,10 @@ def _chosen(
     if guide == GuideKind.DIRECT:
         return DirectGuide()
     if guide == GuideKind.PATH:
-        iterations = math.ceil(effort * scenario.planning.iterations)
-        searches = scenario.planning.searches if effort == 1.0 else 1
-        planning = replace(scenario.planning, iterations=iterations, searches=searches)
+        planning = scenario.planning
+        if effort < 1.0:
+            iterations = math.ceil(effort * planning.iterations)
+            planning = replace(planning, iterations=iterations, near_share=1.0, searches=1)
         return PathGuide(scenario.arm, SeparatingPlanes(bound), planning)
     return guide
 

@@ -27,7 +27,7 @@ _CHECKS = 300  # of those, where the end effector is in its region
 _ROOM = 0.005  # that ends keep from contact, in units of the reach
 _PATH_ROOM = 0.0025  # that the path keeps that makes a problem solvable, in the same units
 _APART = 0.3  # of the ends' end effectors, at least, in units of the reach
-_BUDGET = PathGuideParameters(iterations=100_000, searches=1, shortcuts=1)
+_BUDGET = PathGuideParameters(iterations=100_000, near_share=0.0, searches=1, shortcuts=1)
 
 
 def random_problems(

@@ -1,5 +1,7 @@
 """PathGuide: sub-goals along a collision-free path."""
 
+import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,6 +13,9 @@ from densarm.guides.guide import FreeSpace, GuidePath, NoPath
 from densarm.guides.shortcut import shortcut
 from densarm.validation import non_negative, positive, positive_integer
 
+Bounds = tuple[Array, Array]
+"""Lowest and highest position of each joint (nv,) [rad or m]."""
+
 
 @dataclass(frozen=True)
 class PathGuideParameters:
@@ -18,6 +23,15 @@ class PathGuideParameters:
 
     iterations: int = 50_000
     """Samples that one search draws at most."""
+
+    near_share: float = 0.08
+    """Share of the first search's samples that are drawn near start and goal, and tried alone
+    before the others: most paths need no more of the space, and are found sooner there, and
+    shorter; 0 to 1."""
+
+    near_distance: float = 1.0
+    """How far beyond its positions at start and goal a joint is near [rad or m]. Continuous joints
+    are everywhere."""
 
     searches: int = 2
     """Searches from scratch, each with its own seed, before giving up."""
@@ -35,6 +49,9 @@ class PathGuideParameters:
 
     def __post_init__(self) -> None:
         positive_integer("iterations", self.iterations)
+        if not 0.0 <= self.near_share <= 1.0:
+            raise InvalidValueError("near_share", self.near_share, "in [0, 1]")
+        positive("near_distance", self.near_distance)
         positive_integer("searches", self.searches)
         positive("extension", self.extension)
         positive_integer("shortcuts", self.shortcuts)
@@ -45,7 +62,8 @@ class PathGuide:
     """Search a path whose every segment is proved clear, and shorten it.
 
     The straight segment comes first, being the shortest path; then RRT-Connect (Kuffner and
-    LaValle, ICRA 2000; by OMPL), then shortcuts between random points of the path found.
+    LaValle, ICRA 2000; by OMPL), near both ends and then everywhere, then shortcuts between random
+    points of the path found.
 
     Args:
         arm: the arm; every joint that is not continuous needs position limits.
@@ -82,31 +100,48 @@ class PathGuide:
     def _search(self, start: Array, goal: Array, rng: np.random.Generator) -> GuidePath | NoPath:
         from densarm.guides.rrt_connect import rrt_connect
 
-        p = self._parameters
-        bounds = self._bounds(start, goal)
-        for search in range(1, p.searches + 1):
+        for iterations, bounds, extension in self._searches(start, goal):
             path = rrt_connect(
                 self._arm,
                 self._freedom,
                 start,
                 goal,
                 bounds=bounds,
-                iterations=p.iterations,
-                extension=search * p.extension,
+                iterations=iterations,
+                extension=extension,
                 seed=int(rng.integers(1, 2**31)),
             )
             if path is not None:
+                tries = self._parameters.shortcuts
                 return GuidePath(
-                    shortcut(self._arm, self._freedom, path, p.shortcuts, rng), is_clear=True
+                    shortcut(self._arm, self._freedom, path, tries, rng), is_clear=True
                 )
+        p = self._parameters
         return NoPath(
             f"the straight segment is not clear, and {p.searches} searches by RRT-Connect of "
             f"{p.iterations} iterations each found no path"
         )
 
-    def _bounds(self, start: Array, goal: Array) -> tuple[Array, Array]:
+    def _searches(self, start: Array, goal: Array) -> Iterator[tuple[int, Bounds, float]]:
+        """Yield the iterations of each search, where it draws samples, and its longest edge."""
+        p = self._parameters
+        ends = self._arm.angles(np.stack([start, goal]))
+        lower, upper = everywhere = self._bounds(ends)
+        near = (
+            np.maximum(lower, ends.min(axis=0) - p.near_distance),
+            np.minimum(upper, ends.max(axis=0) + p.near_distance),
+        )
+        alone = math.ceil(p.near_share * p.iterations)
+        if alone > 0:
+            yield alone, near, p.extension
+        if alone < p.iterations:
+            yield p.iterations - alone, everywhere, p.extension
+        for search in range(2, p.searches + 1):
+            yield p.iterations, everywhere, search * p.extension
+
+    def _bounds(self, ends: Array) -> Bounds:
         """Return position limits (nv,) moved inwards by the limit margin."""
-        limits, ends = self._arm.limits, self._arm.angles(np.stack([start, goal]))
+        limits = self._arm.limits
         below, above = (ends - limits.lower).min(axis=0), (limits.upper - ends).min(axis=0)
         margin = self._parameters.limit_margin
         lower = limits.lower + np.minimum(margin, 0.5 * below)

@@ -62,7 +62,10 @@ def rrt_connect(
 
 
 class _JointSpace:
-    """OMPL's space of the joints: the bounded ones in one box, then a circle for each other."""
+    """OMPL's space of the joints: the bounded ones in one box, then a circle for each other.
+
+    A box alone is not compounded, for OMPL compares states of a compound space more slowly.
+    """
 
     def __init__(self, arm: Arm, lower: Array, upper: Array) -> None:
         self._arm = arm
@@ -70,12 +73,10 @@ class _JointSpace:
         self._order = np.concatenate([bounded, circles])
         self._position = np.argsort(self._order)
         self._box = slice(0, len(bounded))
-        self._space = ob.CompoundStateSpace()
-        if bounded.size:  # OMPL refuses a box without a side
-            self._space.addSubspace(_box(lower[bounded], upper[bounded]), 1.0)
-        self._circles = [self._space.getSubspaceCount() + k for k in range(len(circles))]
-        for _ in circles:
-            self._space.addSubspace(ob.SO2StateSpace(), 1.0)
+        parts = [_box(lower[bounded], upper[bounded])] if bounded.size else []
+        self._circles = range(len(parts), len(parts) + len(circles))
+        parts += [ob.SO2StateSpace() for _ in circles]
+        self._space = _compound(parts) if len(circles) else parts[0]
 
     def information(self, freedom: FreeSpace) -> ob.SpaceInformation:
         """Return OMPL's space information, whose checks ask `freedom`."""
@@ -96,10 +97,18 @@ class _JointSpace:
 
     def configuration(self, state: ob.State) -> Array:
         """Return the configuration (nq,) of a state."""
+        if not self._circles:
+            return self._arm.configurations(np.array(state[self._box]))
         values = state[0][self._box] if self._box.stop else []
-        if self._circles:
-            values += [state[index].value for index in self._circles]
+        values += [state[index].value for index in self._circles]
         return self._arm.configurations(np.array(values).take(self._position))
+
+
+def _compound(parts: list[ob.StateSpace]) -> ob.CompoundStateSpace:
+    space = ob.CompoundStateSpace()
+    for part in parts:
+        space.addSubspace(part, 1.0)
+    return space
 
 
 def _box(lower: Array, upper: Array) -> ob.RealVectorStateSpace:

@@ -97,27 +97,65 @@ def test_an_enclosed_goal_has_no_path(arm, make_discs, enclosure):
     assert "100 iterations" in answer.reason
 
 
+class Watched:
+    """A world that remembers the segments it was asked for, but the straight one."""
+
+    def __init__(self, arm, world):
+        self._arm, self._world = arm, world
+        self._asked = []
+
+    def configuration_is_clear(self, q):
+        return self._world.configuration_is_clear(q)
+
+    def segment_is_clear(self, q_a, q_b):
+        self._asked.append((q_a, q_b))
+        return self._world.segment_is_clear(q_a, q_b)
+
+    @property
+    def ends(self):
+        """Joint positions (N, 2, nv)."""
+        return self._arm.angles(np.array(self._asked[1:]))
+
+    @property
+    def lengths(self):
+        q_a, q_b = np.array(self._asked[1:]).swapaxes(0, 1)
+        return np.linalg.norm(self._arm.difference(q_a, q_b), axis=1)
+
+
 def test_later_searches_add_longer_edges(arm, make_discs, enclosure):
-    class Watched:
-        def __init__(self):
-            self.world, self.longest = make_discs(arm, *enclosure), []
-
-        def configuration_is_clear(self, q):
-            return self.world.configuration_is_clear(q)
-
-        def segment_is_clear(self, q_a, q_b):
-            self.longest.append(float(np.linalg.norm(arm.difference(q_a, q_b))))
-            return self.world.segment_is_clear(q_a, q_b)
-
-    watched = Watched()
+    watched = Watched(arm, make_discs(arm, *enclosure))
     parameters = PathGuideParameters(iterations=100, searches=2, extension=0.3)
     ends = arm.configuration([-2.0, 0.0]), arm.configuration([0.0, 0.0])
     PathGuide(arm, watched, parameters).plan(*ends, 0)
-    lengths = np.array(watched.longest[1:])
+    lengths = watched.lengths
     later = np.flatnonzero(lengths > 0.31)
     assert lengths.max() <= 0.6 + 1e-9
     assert (lengths[: later[0]] <= 0.3 + 1e-9).all()
     assert later[0] > 50
+
+
+def test_the_first_samples_are_near_both_ends(make_arm, make_discs, enclosure):
+    arm = make_arm("revolute", "revolute")
+    watched = Watched(arm, make_discs(arm, *enclosure))
+    parameters = PathGuideParameters(100, near_share=0.5, near_distance=0.4, searches=1)
+    ends = arm.configuration([-2.0, 0.0]), arm.configuration([0.0, 0.0])
+    PathGuide(arm, watched, parameters).plan(*ends, 0)
+    middle, half = np.array([-1.0, 0.0]), np.array([1.0, 0.0])
+    beyond = np.abs(watched.ends - middle) - half
+    far = np.flatnonzero(beyond.max(axis=(1, 2)) > 0.4 + 1e-9)
+    assert far[0] >= 50
+    assert beyond[: far[0]].max() > 0.3
+
+
+def test_all_samples_may_be_near_both_ends(make_arm, make_discs):
+    """The way round the wall is not near, so that nothing is found there."""
+    arm = make_arm("revolute", "revolute")
+    wall = make_discs(arm, (0.0, 0.0, 0.6), (0.0, 1.0, 0.6), (0.3, -0.9, 0.4))
+    near = {"near_distance": 0.5, "iterations": 500, "searches": 1}
+    only = PathGuide(arm, wall, PathGuideParameters(near_share=1.0, **near))
+    first = PathGuide(arm, wall, PathGuideParameters(near_share=0.5, **near))
+    assert isinstance(only.plan(*ends(arm), 0), NoPath)
+    assert isinstance(first.plan(*ends(arm), 0), GuidePath)
 
 
 def test_an_end_in_contact_is_named(arm, wall):
@@ -147,10 +185,18 @@ def test_a_joint_without_an_interval_is_refused(make_arm, make_discs):
         PathGuide(arm, make_discs(arm))
 
 
-@pytest.mark.parametrize("field", ["iterations", "searches", "extension", "shortcuts"])
+@pytest.mark.parametrize(
+    "field", ["iterations", "near_distance", "searches", "extension", "shortcuts"]
+)
 def test_parameters_are_positive(field):
     with pytest.raises(InvalidValueError, match=field):
         PathGuideParameters(**{field: 0})
+
+
+@pytest.mark.parametrize("share", [-0.1, 1.1, np.nan])
+def test_a_share_outside_its_interval_is_refused(share):
+    with pytest.raises(InvalidValueError, match=r"near_share.*\[0, 1\]"):
+        PathGuideParameters(near_share=share)
 
 
 @pytest.mark.parametrize("answers", [1, 3, 5, 10])
