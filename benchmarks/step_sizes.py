@@ -4,9 +4,9 @@
 
 Each row is what `densarm bench step` measures for Panda, in a process of its own, so that memory is
 that row's alone. Percentiles are of processor time. Steady is 99.9 % over 50 % of the steps that
-follow a step directly; resumed is the first step after other calls, which finds nothing in the
-caches: it comes once in 499 steps, and so it alone makes the plain 99.9 %. Undisturbed is 99.9 %
-over 50 % of the least time of each state in all its visits.
+follow a step directly, no other process in between; resumed is the first step after other calls,
+which finds nothing in the caches and comes once in 4,999 steps. Undisturbed is 99.9 % over 50 % of
+the least time of each state in all its visits.
 10⁵ steps give the 99.9 % a hundred samples; 10⁶ show whether memory grows.
 """
 
