@@ -1,6 +1,7 @@
 """A short run in real time tracks its goals, and what is kept of it is told."""
 
 import json
+import os
 import runpy
 from pathlib import Path
 
@@ -24,6 +25,15 @@ def test_a_short_run_is_told(script, tmp_path, capsys):
     assert 0 <= found["missed"] <= 60
     assert max(found["largest_error_rad"]) < 1e-3
     assert "missed deadlines" in capsys.readouterr().out
+
+
+def test_a_run_without_the_right_to_priority_says_so(script, monkeypatch):
+    def refuse(*_arguments):
+        raise PermissionError(1, "Operation not permitted")
+
+    monkeypatch.setattr(os, "sched_setscheduler", refuse)
+    with pytest.raises(SystemExit, match="not allowed"):
+        script["main"](["--fifo", "--steps", "1"])
 
 
 def test_late_steps_are_counted(script):
