@@ -68,13 +68,7 @@ class ChangingObstacles:
 
     def add(self, obstacle: Obstacle) -> None:
         """Act as `Clearance.add_obstacle`."""
-        if obstacle.name in self._present or obstacle.name in self._other_names():
-            raise InvalidValueError("obstacle name", obstacle.name, "not in use")
-        slot = next((slot for slot in self._spare if slot.can_hold(obstacle)), None)
-        if slot is None:
-            kinds = ", ".join(sorted(type(slot.obstacle).__name__ for slot in self._spare))
-            allowed = f"like a spare obstacle ({kinds or 'none left'}), or make a new Clearance"
-            raise InvalidValueError("obstacle", obstacle, allowed)
+        slot = _room_for(obstacle, self._spare, self._names_but_of(self._spare))
         self._spare.remove(slot)
         self._present[obstacle.name] = slot
         self._pairs = None
@@ -92,15 +86,24 @@ class ChangingObstacles:
         if scene.attachments != self._attachments:
             raise InvalidValueError("attached bodies", scene.attachments, "those of the clearance")
         wanted = {item.name: item for item in scene}
-        for name, slot in list(self._present.items()):
-            if name not in wanted or not slot.can_hold(wanted[name]):
-                self.remove(name)
-        for obstacle in scene:
-            present = self._present.get(obstacle.name)
-            if present is None:
-                self.add(obstacle)
-            elif present.obstacle != obstacle:
-                self._fill(present, obstacle)
+        staying = {
+            name: slot
+            for name, slot in self._present.items()
+            if name in wanted and slot.can_hold(wanted[name])
+        }
+        leaving = [slot for name, slot in self._present.items() if name not in staying]
+        new = [item for item in scene if item.name not in staying]
+        room = [*self._spare, *leaving]
+        taken = self._names_but_of(room)
+        for obstacle in new:  # whatever is refused is refused before anything changes
+            room.remove(_room_for(obstacle, room, taken))
+        for slot in leaving:
+            self.remove(slot.obstacle.name)
+        for obstacle in new:
+            self.add(obstacle)
+        for name, slot in staying.items():
+            if slot.obstacle != wanted[name]:
+                self._fill(slot, wanted[name])
 
     def _fill(self, slot: "_Slot", obstacle: Obstacle) -> None:
         slot.resize(obstacle)
@@ -112,9 +115,11 @@ class ChangingObstacles:
             raise UnknownNameError("obstacle", name, self._present)
         return self._present[name]
 
-    def _other_names(self) -> set[str]:
-        taken = {item.name for slot in self._spare for item in slot.shapes}
-        return {item.name for item in self._shapes} - taken
+    def _names_but_of(self, slots: "list[_Slot]") -> set[str]:
+        """Return the names of all bodies but those in some slots."""
+        others = {s.obstacle.name for s in self._present.values() if s not in slots}
+        free = {item.name for slot in slots for item in slot.shapes}
+        return others | ({item.name for item in self._shapes} - free)
 
     def _note(self, slot: "_Slot", sign: int) -> None:
         self.version += 1
@@ -152,6 +157,18 @@ class _Slot:
         for k, shape in enumerate(self.shapes):
             shape.placement = pose
             shape.name = obstacle.name if one else f"{obstacle.name}.{k}"
+
+
+def _room_for(obstacle: Obstacle, slots: list[_Slot], taken: set[str]) -> _Slot:
+    """Return the first slot that can hold a new obstacle, whose name must not be taken."""
+    if obstacle.name in taken:
+        raise InvalidValueError("obstacle name", obstacle.name, "not in use")
+    for slot in slots:
+        if slot.can_hold(obstacle):
+            return slot
+    kinds = ", ".join(sorted(type(slot.obstacle).__name__ for slot in slots))
+    allowed = f"like a spare obstacle ({kinds or 'none left'}), or make a new Clearance"
+    raise InvalidValueError("obstacle", obstacle, allowed)
 
 
 def _moved(obstacle: Any, pose: dict[str, Any]) -> Obstacle:

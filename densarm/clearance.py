@@ -171,8 +171,8 @@ class Clearance:
             scene: the obstacles; its attached bodies are those of the clearance.
 
         Raises:
-            InvalidValueError: other attached bodies, or no spare obstacle for one that is new; the
-                obstacles before it are changed then.
+            InvalidValueError: other attached bodies, or no spare obstacle for one that is new;
+                nothing is changed then.
         """
         self._obstacles.change_to(scene)
         self._skip_spare_pairs()

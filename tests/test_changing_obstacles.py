@@ -135,10 +135,31 @@ def test_changing_to_a_scene_costs_its_differences():
     before = clearance.version
     clearance.change_to(Scene([replace(TABLE, position=(0, 0, -1)), BALL]))
     assert clearance.version == before + 1
-    with pytest.raises(InvalidValueError, match="spare obstacle"):
-        clearance.change_to(Scene([BALL, TABLE, *MORE, *LARGE]))
-    with pytest.raises(InvalidValueError, match="attached bodies"):
-        clearance.change_to(Scene([BALL], [Attachment(LARGE[0], "panda_hand")]))
+
+
+@pytest.mark.parametrize(
+    ("scene", "match"),
+    [
+        (Scene([replace(TABLE, position=(0, 0, -1)), *MORE, *LARGE]), "spare obstacle"),
+        (Scene([replace(BALL, name="panda_link0_0")]), "not in use"),
+        (Scene([], [Attachment(LARGE[0], "panda_hand")]), "attached bodies"),
+    ],
+)
+def test_a_refused_change_changes_nothing(scene, match):
+    clearance = make()
+    before = clearance.version, clearance.scene, clearance.pairs, clearance.distances(READY)
+    with pytest.raises(InvalidValueError, match=match):
+        clearance.change_to(scene)
+    assert (clearance.version, clearance.scene, clearance.pairs) == before[:3]
+    np.testing.assert_array_equal(clearance.distances(READY), before[3])
+
+
+def test_an_obstacle_may_change_its_kind():
+    clearance = make()
+    other = Sphere(name=TABLE.name, radius=0.1, position=(0.5, 0.0, 1.0))
+    clearance.change_to(Scene([replace(BALL, name="thing"), other]))
+    assert [item.name for item in clearance.scene] == ["thing", TABLE.name]
+    check_is_that_of_its_scene(clearance, READY)
 
 
 def hold(clearance: Clearance, q: np.ndarray, sensing: float) -> DensityTracking:
