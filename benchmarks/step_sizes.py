@@ -55,10 +55,12 @@ def draw(rows: list[dict[str, Any]], file: Path) -> None:
             axes.loglog(pairs, times, style, color=color, ms=4, label=f"{shapes}s, {name}")
         largest = [row["step_percentiles_us"][2] for row in of_shapes]
         axes.loglog(pairs, largest, ":", color=color, label=f"{shapes}s, step at 99.9 %")
+    axes.set_xticks(PAIRS, [str(pairs) for pairs in PAIRS])
+    axes.minorticks_off()
     axes.set_xlabel("geometry pairs")
     axes.set_ylabel("time [µs]")
     axes.set_title("One control step of Panda", size=11)
-    axes.grid(alpha=0.3, which="both")
+    axes.grid(alpha=0.3)
     axes.legend(fontsize=8)
     figure.savefig(file, dpi=150)
 

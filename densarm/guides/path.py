@@ -30,8 +30,8 @@ class PathGuideParameters:
     shorter; 0 to 1."""
 
     near_distance: float = 1.0
-    """How far beyond its positions at start and goal a joint is near [rad or m]. Continuous joints
-    are everywhere."""
+    """How far beyond its positions at start and goal, and those between, a joint is near [rad or
+    m]."""
 
     searches: int = 2
     """Searches from scratch, each with its own seed, before giving up."""
@@ -125,22 +125,27 @@ class PathGuide:
     def _searches(self, start: Array, goal: Array) -> Iterator[tuple[int, Bounds, float]]:
         """Yield the iterations of each search, where it draws samples, and its longest edge."""
         p = self._parameters
-        ends = self._arm.angles(np.stack([start, goal]))
-        lower, upper = everywhere = self._bounds(ends)
-        near = (
-            np.maximum(lower, ends.min(axis=0) - p.near_distance),
-            np.minimum(upper, ends.max(axis=0) + p.near_distance),
-        )
+        first = self._arm.angles(start)
+        ends = np.stack([first, first + self._arm.difference(start, goal)])
+        everywhere = self._bounds(ends)
         alone = math.ceil(p.near_share * p.iterations)
         if alone > 0:
-            yield alone, near, p.extension
+            yield alone, self._near(ends, everywhere), p.extension
         if alone < p.iterations:
             yield p.iterations - alone, everywhere, p.extension
         for search in range(2, p.searches + 1):
             yield p.iterations, everywhere, search * p.extension
 
+    def _near(self, ends: Array, everywhere: Bounds) -> Bounds:
+        """Return where joints are near both ends; a continuous one anywhere if that is a turn."""
+        away = self._parameters.near_distance
+        lower = np.maximum(everywhere[0], ends.min(axis=0) - away)
+        upper = np.minimum(everywhere[1], ends.max(axis=0) + away)
+        is_anywhere = self._arm.is_circle & (upper - lower >= 2.0 * np.pi)
+        return np.where(is_anywhere, -np.inf, lower), np.where(is_anywhere, np.inf, upper)
+
     def _bounds(self, ends: Array) -> Bounds:
-        """Return position limits (nv,) moved inwards by the limit margin."""
+        """Return position limits (nv,) moved inwards by the limit margin; continuous: infinite."""
         limits = self._arm.limits
         below, above = (ends - limits.lower).min(axis=0), (limits.upper - ends).min(axis=0)
         margin = self._parameters.limit_margin

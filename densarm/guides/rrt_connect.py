@@ -31,7 +31,9 @@ def rrt_connect(
         freedom: proves configurations and segments.
         start: (nq,) configuration within the bounds.
         goal: (nq,) configuration within the bounds.
-        bounds: lowest and highest position of each joint (nv,) [rad or m].
+        bounds: lowest and highest position of each joint (nv,) [rad or m]; infinite for a
+            continuous joint that may be anywhere. Where they are finite, start and goal are less
+            than a turn above the lowest.
         iterations: samples to draw at most.
         extension: longest edge of the trees [rad or m].
         seed: whole number >= 1; reseeds OMPL's generator, which is one for the process.
@@ -69,7 +71,10 @@ class _JointSpace:
 
     def __init__(self, arm: Arm, lower: Array, upper: Array) -> None:
         self._arm = arm
-        bounded, circles = np.flatnonzero(~arm.is_circle), np.flatnonzero(arm.is_circle)
+        self._lower = lower
+        is_bounded = np.isfinite(lower)
+        self._rolls = np.flatnonzero(is_bounded & arm.is_circle)
+        bounded, circles = np.flatnonzero(is_bounded), np.flatnonzero(~is_bounded)
         self._order = np.concatenate([bounded, circles])
         self._position = np.argsort(self._order)
         self._box = slice(0, len(bounded))
@@ -91,7 +96,9 @@ class _JointSpace:
         """Return the state of a configuration (nq,)."""
         # Never freed: nanobind ends the process with a segmentation fault after freeState.
         state = self._space.allocState()
-        self._space.copyFromReals(state, self._arm.angles(q)[self._order].tolist())
+        angles, rolls, lowest = self._arm.angles(q), self._rolls, self._lower[self._rolls]
+        angles[rolls] = lowest + np.mod(angles[rolls] - lowest, 2.0 * np.pi)
+        self._space.copyFromReals(state, angles[self._order].tolist())
         self._space.enforceBounds(state)  # OMPL's circle is [-pi, pi), without its upper end
         return state
 

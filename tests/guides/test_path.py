@@ -147,6 +147,27 @@ def test_the_first_samples_are_near_both_ends(make_arm, make_discs, enclosure):
     assert beyond[: far[0]].max() > 0.3
 
 
+def test_continuous_joints_are_near_across_the_seam(make_arm, make_discs):
+    """From 2.9 to -2.9 the short way, where a disc is passed by the second joint."""
+    arm = make_arm("continuous", "revolute")
+    watched = Watched(arm, make_discs(arm, (np.pi, 0.0, 0.2)))
+    start, goal = arm.configuration([2.9, 0.0]), arm.configuration([-2.9, 0.0])
+    parameters = PathGuideParameters(300, near_share=1.0, near_distance=0.4)
+    assert isinstance(PathGuide(arm, watched, parameters).plan(start, goal, 0), GuidePath)
+    off_seam = np.abs(np.mod(watched.ends[..., 0], 2.0 * np.pi) - np.pi)
+    assert 0.25 < off_seam.max() <= np.pi - 2.9 + 0.4 + 1e-9
+
+
+def test_near_a_whole_turn_is_anywhere(make_arm, make_discs):
+    """A wall at the seam leaves the long way."""
+    arm = make_arm("continuous", "revolute")
+    world = make_discs(arm, *[(np.pi, y, 0.4) for y in np.arange(-3.0, 3.1, 0.5)])
+    start, goal = arm.configuration([2.5, 0.0]), arm.configuration([-2.5, 0.0])
+    for distance, answer in ((0.4, NoPath), (3.0, GuidePath)):
+        parameters = PathGuideParameters(500, 1.0, near_distance=distance, searches=1)
+        assert isinstance(PathGuide(arm, world, parameters).plan(start, goal, 0), answer)
+
+
 def test_all_samples_may_be_near_both_ends(make_arm, make_discs):
     """The way round the wall is not near, so that nothing is found there."""
     arm = make_arm("revolute", "revolute")
