@@ -66,14 +66,15 @@ def rrt_connect(
 class _JointSpace:
     """OMPL's space of the joints: the bounded ones in one box, then a circle for each other.
 
-    A box alone is not compounded, for OMPL compares states of a compound space more slowly.
+    A continuous joint that is bounded is in the box, unrolled. A box alone is not compounded, for
+    OMPL compares states of a compound space more slowly.
     """
 
     def __init__(self, arm: Arm, lower: Array, upper: Array) -> None:
         self._arm = arm
         self._lower = lower
         is_bounded = np.isfinite(lower)
-        self._rolls = np.flatnonzero(is_bounded & arm.is_circle)
+        self._unrolled = np.flatnonzero(is_bounded & arm.is_circle)
         bounded, circles = np.flatnonzero(is_bounded), np.flatnonzero(~is_bounded)
         self._order = np.concatenate([bounded, circles])
         self._position = np.argsort(self._order)
@@ -96,8 +97,9 @@ class _JointSpace:
         """Return the state of a configuration (nq,)."""
         # Never freed: nanobind ends the process with a segmentation fault after freeState.
         state = self._space.allocState()
-        angles, rolls, lowest = self._arm.angles(q), self._rolls, self._lower[self._rolls]
-        angles[rolls] = lowest + np.mod(angles[rolls] - lowest, 2.0 * np.pi)
+        angles, unrolled = self._arm.angles(q), self._unrolled
+        lowest = self._lower[unrolled]
+        angles[unrolled] = lowest + np.mod(angles[unrolled] - lowest, 2.0 * np.pi)
         self._space.copyFromReals(state, angles[self._order].tolist())
         self._space.enforceBounds(state)  # OMPL's circle is [-pi, pi), without its upper end
         return state
