@@ -31,8 +31,8 @@ _LIMIT_INSET = 0.2 * REACHED_POSITION
 
 _ATTEMPTS = ((1.0, 0.01), (0.25, 1.0), (0.05, 1.0))
 """Shares of the path margin and of the planner's iterations, tried in turn: most spaces are wide,
-and a narrow passage may leave less room than wanted. Where not all are to be spent, all that are
-draw samples near both ends."""
+and a narrow passage may leave less room than wanted. Where not all are to be spent, those that are
+draw samples near both ends above all."""
 
 _END_SHARE = 0.5
 """Share of the clearance at start and goal that a path's margin may take."""

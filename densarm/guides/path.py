@@ -16,6 +16,9 @@ from densarm.validation import non_negative, positive, positive_integer
 Bounds = tuple[Array, Array]
 """Lowest and highest position of each joint (nv,) [rad or m]."""
 
+_POSITIONS = 4
+"""Of each joint, whose combinations are as many samples as a search near both ends is worth."""
+
 
 @dataclass(frozen=True)
 class PathGuideParameters:
@@ -27,7 +30,8 @@ class PathGuideParameters:
     near_share: float = 0.08
     """Share of the first search's samples that are drawn near start and goal, and tried alone
     before the others: most paths need no more of the space, and are found sooner there, and
-    shorter; 0 to 1."""
+    shorter; 0 to 1. No more than 4^nv are, for what arms of few joints do not find soon is not
+    there."""
 
     near_distance: float = 1.0
     """How far beyond its positions at start and goal, and those between, a joint is near [rad or
@@ -128,7 +132,7 @@ class PathGuide:
         first = self._arm.angles(start)
         ends = np.stack([first, first + self._arm.difference(start, goal)])
         everywhere = self._bounds(ends)
-        alone = math.ceil(p.near_share * p.iterations)
+        alone = min(math.ceil(p.near_share * p.iterations), _POSITIONS**self._arm.nv)
         if alone > 0:
             yield alone, self._near(ends, everywhere), p.extension
         if alone < p.iterations:

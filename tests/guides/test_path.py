@@ -139,13 +139,13 @@ def test_later_searches_add_longer_edges(arm, make_discs, enclosure):
 def test_the_first_samples_are_near_both_ends(make_arm, make_discs, enclosure):
     arm = make_arm("revolute", "revolute")
     watched = Watched(arm, make_discs(arm, *enclosure))
-    parameters = PathGuideParameters(100, near_share=0.5, near_distance=0.4, searches=1)
+    parameters = PathGuideParameters(100, near_share=0.1, near_distance=0.4, searches=1)
     ends = arm.configuration([-2.0, 0.0]), arm.configuration([0.0, 0.0])
     PathGuide(arm, watched, parameters).plan(*ends, 0)
     middle, half = np.array([-1.0, 0.0]), np.array([1.0, 0.0])
     beyond = np.abs(watched.ends - middle) - half
     far = np.flatnonzero(beyond.max(axis=(1, 2)) > 0.4 + 1e-9)
-    assert far[0] >= 50
+    assert far[0] >= 10
     assert beyond[: far[0]].max() > 0.3
 
 
@@ -154,7 +154,7 @@ def test_continuous_joints_are_near_across_the_seam(make_arm, make_discs):
     arm = make_arm("continuous", "revolute")
     watched = Watched(arm, make_discs(arm, (np.pi, 0.0, 0.2)))
     start, goal = arm.configuration([2.9, 0.0]), arm.configuration([-2.9, 0.0])
-    parameters = PathGuideParameters(300, near_share=1.0, near_distance=0.4)
+    parameters = PathGuideParameters(16, near_share=1.0, near_distance=0.4, searches=1)
     assert isinstance(PathGuide(arm, watched, parameters).plan(start, goal, 0), GuidePath)
     off_seam = np.abs(np.mod(watched.ends[..., 0], 2.0 * np.pi) - np.pi)
     assert 0.25 < off_seam.max() <= np.pi - 2.9 + 0.4 + 1e-9
@@ -166,19 +166,18 @@ def test_near_a_whole_turn_is_anywhere(make_arm, make_discs):
     world = make_discs(arm, *[(np.pi, y, 0.4) for y in np.arange(-3.0, 3.1, 0.5)])
     start, goal = arm.configuration([2.5, 0.0]), arm.configuration([-2.5, 0.0])
     for distance, answer in ((0.4, NoPath), (3.0, GuidePath)):
-        parameters = PathGuideParameters(500, 1.0, near_distance=distance, searches=1)
+        parameters = PathGuideParameters(16, 1.0, near_distance=distance, searches=1)
         assert isinstance(PathGuide(arm, world, parameters).plan(start, goal, 0), answer)
 
 
-def test_all_samples_may_be_near_both_ends(make_arm, make_discs):
-    """The way round the wall is not near, so that nothing is found there."""
+def test_what_is_not_found_soon_near_both_ends_is_searched_everywhere(make_arm, make_discs):
+    """The way round the wall is not near: all of few samples find none, nor do many for long."""
     arm = make_arm("revolute", "revolute")
     wall = make_discs(arm, (0.0, 0.0, 0.6), (0.0, 1.0, 0.6), (0.3, -0.9, 0.4))
-    near = {"near_distance": 0.5, "iterations": 500, "searches": 1}
-    only = PathGuide(arm, wall, PathGuideParameters(near_share=1.0, **near))
-    first = PathGuide(arm, wall, PathGuideParameters(near_share=0.5, **near))
-    assert isinstance(only.plan(*ends(arm), 0), NoPath)
-    assert isinstance(first.plan(*ends(arm), 0), GuidePath)
+    few, many = (PathGuideParameters(n, 1.0, near_distance=0.5, searches=1) for n in (16, 500))
+    assert isinstance(PathGuide(arm, wall, few).plan(*ends(arm), 0), NoPath)
+    assert wall.segments < 100
+    assert isinstance(PathGuide(arm, wall, many).plan(*ends(arm), 0), GuidePath)
 
 
 def test_an_end_in_contact_is_named(arm, wall):
