@@ -69,10 +69,7 @@ class ChangingObstacles:
     def add(self, obstacle: Obstacle) -> None:
         """Act as `Clearance.add_obstacle`."""
         slot = _room_for(obstacle, self._spare, self._names_but_of(self._spare))
-        self._spare.remove(slot)
-        self._present[obstacle.name] = slot
-        self._pairs = None
-        self._fill(slot, obstacle)
+        self._occupy(slot, obstacle)
 
     def remove(self, name: str) -> None:
         """Act as `Clearance.remove_obstacle`."""
@@ -95,15 +92,23 @@ class ChangingObstacles:
         new = [item for item in scene if item.name not in staying]
         room = [*self._spare, *leaving]
         taken = self._names_but_of(room)
+        found = []
         for obstacle in new:  # whatever is refused is refused before anything changes
-            room.remove(_room_for(obstacle, room, taken))
+            found.append(_room_for(obstacle, room, taken))
+            room.remove(found[-1])
         for slot in leaving:
             self.remove(slot.obstacle.name)
-        for obstacle in new:
-            self.add(obstacle)
+        for slot, obstacle in zip(found, new, strict=True):
+            self._occupy(slot, obstacle)
         for name, slot in staying.items():
             if slot.obstacle != wanted[name]:
                 self._fill(slot, wanted[name])
+
+    def _occupy(self, slot: "_Slot", obstacle: Obstacle) -> None:
+        self._spare.remove(slot)
+        self._present[obstacle.name] = slot
+        self._pairs = None
+        self._fill(slot, obstacle)
 
     def _fill(self, slot: "_Slot", obstacle: Obstacle) -> None:
         slot.resize(obstacle)

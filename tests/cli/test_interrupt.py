@@ -10,12 +10,14 @@ import pytest
 from densarm.simulation.plant import PinocchioPlant
 
 # A process started in the background inherits that Ctrl-C is ignored. A whole run takes a tenth of
-# a second, which may pass between two drawings of the terminal: here every step is slow.
+# a second, which may pass between two drawings of the terminal: here planning and steps are slow.
 PROGRAM = """
 import signal, sys, time
 from densarm.cli import main
+from densarm.guides.path import PathGuide
 from densarm.simulation.plant import PinocchioPlant
-step = PinocchioPlant.step
+plan, step = PathGuide.plan, PinocchioPlant.step
+PathGuide.plan = lambda *problem: time.sleep(0.5) or plan(*problem)
 PinocchioPlant.step = lambda *state: time.sleep(0.01) or step(*state)
 signal.signal(signal.SIGINT, signal.default_int_handler)
 sys.exit(main())
@@ -43,6 +45,7 @@ def test_ctrl_c_on_a_terminal_while_running(tmp_path):
     _, err = process.communicate(timeout=30)
     os.close(theirs)
     os.close(ours)
+    assert b"planning" in shown
     assert process.returncode == 130
     assert b"Traceback" not in err
     assert list(tmp_path.iterdir()) == []
