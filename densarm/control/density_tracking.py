@@ -15,6 +15,7 @@ from densarm.control.inverse_dynamics import InverseDynamics, limited_torque
 from densarm.density import NavigationDensity, NearClearanceSet, TorusDistance
 from densarm.density.gauge_gradient import gauge_exponents, write_gauge_gradient
 from densarm.density.goal_distance import torus_distance, write_configuration
+from densarm.density.joint_error import joint_error
 from densarm.proof.straight_brake import HELD_SHARE
 from densarm.reference.reference import Reference, hermite
 
@@ -52,41 +53,38 @@ class DensityTracking:
             arm, HELD_SHARE * arm.limits.acceleration, _mass_data(density)
         )
         parameters, goal_distance = density.parameters, density.goal_distance
-        self._fixed: tuple[Any, ...] = (
+        numbers = (
             reference.period,
             goal_distance.kappa,
             parameters.alpha,
             *gauge_exponents(parameters.gauge, parameters.alpha),
             gains.position,
             gains.velocity,
-            reference.position,
-            reference.velocity,
+        )
+        self._fixed: tuple[Any, ...] = (
+            np.array(numbers),
+            reference.samples,
             arm.idx_q,
             arm.is_circle,
             goal_distance.goal,
             goal_distance.weights,
             density.log_psi_gradient,
             *self._dynamics.terms,
-            np.zeros((9, arm.nv)),
+            np.zeros((6, arm.nv)),
         )
-        self._seen = goal_distance.goal.copy()
         # Kernels are loaded, or compiled, here rather than in the first step of a control loop.
-        self.torque(0.0, self._seen, np.zeros(arm.nv))
-
-    @property
-    def tracking_error(self) -> float:
-        """Largest |e| of a joint at the last call [rad or m]."""
-        return float(np.abs(self._density.goal_distance.error(self._seen)).max())
+        self.torque(0.0, goal_distance.goal, np.zeros(arm.nv))
+        self.tracking_error: float = 0.0
+        """Largest |e| of a joint at the last call, zero before the first [rad or m]."""
 
     def torque(self, t: float, q: ArrayLike, v: ArrayLike) -> Array:
         """Act as `Controller.torque`."""
         q, v = checked_state(self._arm, q, v)
-        self._seen[:] = q
         density = self._density
         density.update_psi(q)
         self._dynamics.update(q, v)
         tau = np.empty(len(v))
-        write_torque(float(t), q, v, density.log_psi, tau, *self._fixed)
+        self.tracking_error = write_torque(float(t), q, v, density.log_psi, tau, *self._fixed)
         return tau
 
 
@@ -103,15 +101,8 @@ def write_torque(
     v: Array,
     log_psi: float,
     tau: Array,
-    period: float,
-    kappa: float,
-    alpha: float,
-    distance_exponent: float,
-    psi_exponent: float,
-    position_gain: float,
-    velocity_gain: float,
-    position: Array,
-    velocity: Array,
+    numbers: Array,
+    samples: Array,
     idx_q: NDArray[np.int64],
     is_circle: NDArray[np.bool_],
     goal: Array,
@@ -119,26 +110,35 @@ def write_torque(
     log_psi_gradient: Array,
     mass: Array,
     nonlinear: Array,
-    limits: Array,
+    limits_and_parts: Array,
     workspace: Array,
-) -> None:
-    """Write the torque of `DensityTracking`, in one kernel since every call has its cost."""
-    parts, point, brake, attract = workspace[:3], workspace[3:6], workspace[6], workspace[7]
-    distance_gradient = workspace[8]
-    hermite(t / period, t / period + 0.5, period, position, velocity, point)
+) -> float:
+    """Write the torque of `DensityTracking`, and return its tracking error.
+
+    It is one kernel, of few arguments, since every call and every argument has its cost.
+    """
+    period, kappa, alpha = numbers[0], numbers[1], numbers[2]
+    distance_exponent, psi_exponent = numbers[3], numbers[4]
+    position_gain, velocity_gain = numbers[5], numbers[6]
+    point, brake, attract, slope = workspace[:3], workspace[3], workspace[4], workspace[5]
+    hermite(t / period, t / period + 0.5, period, samples, point)
     write_configuration(point[0], idx_q, is_circle, goal)
-    distance = torus_distance(goal, q, idx_q, is_circle, weights, kappa, distance_gradient)
+    distance = torus_distance(goal, q, idx_q, is_circle, weights, kappa, slope)
     write_gauge_gradient(
         log_psi_gradient,
         distance,
-        distance_gradient,
+        slope,
         alpha,
         log_psi,
         distance_exponent,
         psi_exponent,
         attract,
     )
+    joint_error(goal, q, idx_q, is_circle, brake)
+    tracking_error = 0.0
     for i in range(v.shape[0]):
+        tracking_error = max(tracking_error, abs(brake[i]))
         brake[i] = point[2, i] - velocity_gain * (v[i] - point[1, i])
         attract[i] *= position_gain
-    limited_torque(mass, nonlinear, limits, brake, attract, parts, tau)
+    limited_torque(mass, nonlinear, limits_and_parts, brake, attract, tau)
+    return tracking_error

@@ -33,10 +33,10 @@ class InverseDynamics:
         self._computes_mass = mass_data is None
         self._data = arm.model.createData() if mass_data is None else mass_data
         self._mass = self._data.M
-        self._workspace = np.zeros((3, arm.nv))
-        limits = np.array([acceleration_limit, arm.limits.effort])
-        self.terms: tuple[Array, Array, Array] = (self._mass, self._data.nle, limits)
-        """M and H of the last update, and the limits, as `limited_torque` takes them."""
+        workspace = np.zeros((5, arm.nv))
+        workspace[:2] = acceleration_limit, arm.limits.effort
+        self.terms: tuple[Array, Array, Array] = (self._mass, self._data.nle, workspace)
+        """M and H of the last update, limits and workspace, as `limited_torque` takes them."""
 
     def update(self, q: Array, v: Array) -> None:
         """Compute M and H at the state, q (nq,) and v (nv,)."""
@@ -63,7 +63,7 @@ class InverseDynamics:
     def torque(self, brake: Array, attract: Array) -> Array:
         """Return torque (nv,) for accelerations (nv,) [rad/s²] at the updated state."""
         tau = np.empty(len(brake))
-        limited_torque(*self.terms, brake, attract, self._workspace, tau)
+        limited_torque(*self.terms, brake, attract, tau)
         return tau
 
 
@@ -93,10 +93,9 @@ def _shares(offset: Array, brake: Array, attract: Array, limit: Array) -> tuple[
 def limited_torque(
     mass: Array,
     nonlinear: Array,
-    limits: Array,
+    workspace: Array,
     brake: Array,
     attract: Array,
-    workspace: Array,
     out: Array,
 ) -> None:
     """Write the torque of `InverseDynamics`.
@@ -104,15 +103,15 @@ def limited_torque(
     Args:
         mass: M, of which the upper triangle is read (nv, nv).
         nonlinear: H (nv,) [N·m or N].
-        limits: of acceleration [rad/s² or m/s²] and torque [N·m or N] (2, nv).
+        workspace: limits of acceleration [rad/s² or m/s²] and torque [N·m or N], zeros, and two
+            rows that are overwritten (5, nv).
         brake: its acceleration (nv,) [rad/s² or m/s²].
         attract: its acceleration (nv,) [rad/s² or m/s²].
-        workspace: its first row is zero, the others are overwritten (3, nv).
         out: overwritten (nv,).
     """
     nv = nonlinear.shape[0]
-    acceleration_limit, effort_limit = limits[0], limits[1]
-    zero, brake_torque, attract_torque = workspace[0], workspace[1], workspace[2]
+    acceleration_limit, effort_limit, zero = workspace[0], workspace[1], workspace[2]
+    brake_torque, attract_torque = workspace[3], workspace[4]
     gamma, beta = _shares(zero, brake, attract, acceleration_limit)
     for i in range(nv):
         brake_torque[i] = attract_torque[i] = 0.0

@@ -15,6 +15,7 @@ from densarm.density.joint_error import joint_error
 from densarm.distance_view import DistanceView
 from densarm.proof.swept_bound import SweptBound
 
+_WORLD = pin.Convention.WORLD
 _ASLEEP, _AWAKE = 0, 1
 _NEVER = 0  # seen, of a pair that must be queried
 _LONGEST_WAY = 1e4  # [rad or m], beyond which sums of small steps would round off too much
@@ -72,6 +73,7 @@ class NearPairs:
         self._pair_states = np.array([[_AWAKE], [_NEVER], [0]]).repeat(n, axis=1)
         self.state: NDArray[np.int64] = self._pair_states[0]
         """Nonzero where a pair is awake (K,)."""
+        self._changed = self._pair_states[2]
         self._pair_numbers = np.ones((2, n))
         self.sensing_distance: Array = self._pair_numbers[0]
         """σ_k > 0 (K,) [m], which may be changed in place."""
@@ -132,13 +134,13 @@ class NearPairs:
         geometry, data = self._geometry, self._geometry_data
         n_awake, n_changed = _wake(q, margin, *self._arrays)
         self._bounds = None
-        for k in self._pair_states[2, :n_changed].tolist() if n_changed else ():
+        for k in self._changed[:n_changed].tolist() if n_changed else ():
             if k >= 0:
                 data.activateCollisionPair(k)
             else:
                 data.deactivateCollisionPair(~k)
         # One pass for placements, Jacobian and M, which costs little more than the first two.
-        pin.crba(self._model, self.data, q, pin.Convention.WORLD)
+        pin.crba(self._model, self.data, q, _WORLD)
         if n_awake:
             pin.updateGeometryPlacements(self._model, self.data, geometry, data)
             pin.computeDistances(geometry, data)

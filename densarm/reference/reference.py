@@ -30,8 +30,9 @@ class Reference:
 
     def __init__(self, period: float, position: Array, velocity: Array) -> None:
         self.period = period
-        self.position = np.ascontiguousarray(position)
-        self.velocity = np.ascontiguousarray(velocity)
+        self.samples: Array = np.array([position, velocity], dtype=np.float64)
+        """Joint positions and velocities (2, N, nv), as given."""
+        self.position, self.velocity = self.samples
         self._point = np.zeros((3, position.shape[1]))
 
     @property
@@ -55,24 +56,22 @@ class Reference:
             Rows position, velocity, acceleration (3, nv), as in `ReferencePoint`.
         """
         u = t / self.period
-        hermite(u, u + lead / self.period, self.period, self.position, self.velocity, self._point)
+        hermite(u, u + lead / self.period, self.period, self.samples, self._point)
         return self._point
 
 
 @compiled
-def hermite(
-    u: float, u_acceleration: float, period: float, position: Array, velocity: Array, out: Array
-) -> None:
+def hermite(u: float, u_acceleration: float, period: float, samples: Array, out: Array) -> None:
     """Interpolate a sampled trajectory.
 
     Args:
         u: time of position and velocity, in periods.
         u_acceleration: time of the acceleration, in periods.
         period: time between samples [s].
-        position: joint positions (N, nv) [rad or m].
-        velocity: joint velocities (N, nv) [rad/s or m/s].
+        samples: joint positions [rad or m] and velocities [rad/s or m/s] (2, N, nv).
         out: rows position, velocity, acceleration (3, nv), overwritten.
     """
+    position, velocity = samples[0], samples[1]
     last = position.shape[0] - 1
     u = min(max(u, 0.0), float(last))
     k = min(int(u), last - 1)

@@ -65,6 +65,10 @@ def test_plain_lists_are_states_too(setting):
         ([1, 0, 1, np.nan], [0, 0], "configuration.*finite"),
         ([1, 0, 1, 0], [np.inf, 0], "velocity.*finite"),
         ([2, 0, 1, 0], [0, 0], r"'shoulder'.*\(cos, sin\)"),
+        ([[1, 0, 1, 0]], [0, 0], r"configuration.*\(4,\), got \(1, 4\)"),
+        (np.array([[1.0, 0.0, 1.0, 0.0]]), np.zeros(2), r"configuration.*\(4,\), got \(1, 4\)"),
+        ("upright", [0, 0], "configuration = 'upright'.*4 numbers"),
+        (None, [0, 0], "configuration = None.*4 numbers"),
     ],
 )
 def test_a_state_that_is_not_one(setting, q, v, message):
