@@ -10,7 +10,8 @@ UNTUNED = ("--tuning-starts", 0)
 def test_table_plot_and_json(command, scenario_file, tmp_path):
     path, plot = tmp_path / "compare.json", tmp_path / "compare.png"
     options = ["--starts", 2, "--seed", 4, "--tuning-starts", 1, "--json", path, "--plot", plot]
-    done = command("compare", scenario_file(), "--methods", "potential_field,cbf_qp", *options)
+    coarse = scenario_file(rest="[simulation]\ndt = 0.005")
+    done = command("compare", coarse, "--methods", "potential_field,cbf_qp", *options)
     assert done.status == 0
     assert done.err == ""
     data = json.loads(path.read_text(encoding="utf-8"))
