@@ -1,8 +1,6 @@
 """Controller: joint torque from time and state."""
 
 import math
-from collections.abc import Callable
-from functools import cache
 from typing import Protocol
 
 import numpy as np
@@ -10,9 +8,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from densarm.arm import Arm
 from densarm.arrays import Array
-from densarm.compiled import compiled_for
+from densarm.compiled import compiled
 from densarm.validation import finite_vector
 
+_FLOAT = np.dtype(np.float64)
+_NO_STATE = np.empty(0)
 _UNIT_TOLERANCE = 1e-6  # of cos² + sin² of a continuous joint
 
 
@@ -48,22 +48,17 @@ def tracking_error(controller: Controller) -> float:
 def checked_state(arm: Arm, q: ArrayLike, v: ArrayLike) -> tuple[Array, Array]:
     """Return q (nq,) and v (nv,) as float arrays; errors as `Controller.torque`."""
     try:
-        if _state_check()(q, v, arm.idx_q, arm.is_circle):
-            return q, v  # type: ignore[return-value]  # the check takes nothing else
-    except TypeError:  # lists, other numbers, or memory that kernels are not compiled for
-        pass
+        x, y = np.ascontiguousarray(q, _FLOAT), np.ascontiguousarray(v, _FLOAT)
+    except (TypeError, ValueError):  # no numbers, which the checks below say better
+        x = y = _NO_STATE
+    if not (x.flags.carray and y.flags.carray):  # kernels would be compiled for read-only arrays
+        x, y = x.copy(), y.copy()
+    if x.ndim == y.ndim == 1 and _is_state(x, y, arm.idx_q, arm.is_circle):
+        return x, y
     return arm.check_configuration("configuration", q), finite_vector("velocity", v, arm.nv)
 
 
-@cache
-def _state_check() -> Callable[..., bool]:
-    """Return `_is_state`, compiled for writable contiguous arrays of doubles and nothing else.
-
-    That is done at the first call, since a given signature is compiled at once.
-    """
-    return compiled_for("b1(f8[::1], f8[::1], i8[::1], b1[::1])")(_is_state)
-
-
+@compiled
 def _is_state(q: Array, v: Array, idx_q: NDArray[np.int64], is_circle: NDArray[np.bool_]) -> bool:
     last = idx_q.size - 1
     if v.size != idx_q.size or q.size != idx_q[last] + (2 if is_circle[last] else 1):
