@@ -33,10 +33,10 @@ class InverseDynamics:
         self._computes_mass = mass_data is None
         self._data = arm.model.createData() if mass_data is None else mass_data
         self._mass = self._data.M
-        workspace = np.zeros((5, arm.nv))
-        workspace[:2] = acceleration_limit, arm.limits.effort
-        self.terms: tuple[Array, Array, Array] = (self._mass, self._data.nle, workspace)
-        """M and H of the last update, limits and workspace, as `limited_torque` takes them."""
+        limits_and_parts = np.zeros((5, arm.nv))
+        limits_and_parts[:2] = acceleration_limit, arm.limits.effort
+        self.terms: tuple[Array, Array, Array] = (self._mass, self._data.nle, limits_and_parts)
+        """M and H of the last update, limits and parts, as `limited_torque` takes them."""
 
     def update(self, q: Array, v: Array) -> None:
         """Compute M and H at the state, q (nq,) and v (nv,)."""
@@ -93,7 +93,7 @@ def _shares(offset: Array, brake: Array, attract: Array, limit: Array) -> tuple[
 def limited_torque(
     mass: Array,
     nonlinear: Array,
-    workspace: Array,
+    limits_and_parts: Array,
     brake: Array,
     attract: Array,
     out: Array,
@@ -103,15 +103,16 @@ def limited_torque(
     Args:
         mass: M, of which the upper triangle is read (nv, nv).
         nonlinear: H (nv,) [N·m or N].
-        workspace: limits of acceleration [rad/s² or m/s²] and torque [N·m or N], zeros, and two
-            rows that are overwritten (5, nv).
+        limits_and_parts: limits of acceleration [rad/s² or m/s²] and torque [N·m or N], zeros, and
+            the parts of the torque, which are overwritten (5, nv).
         brake: its acceleration (nv,) [rad/s² or m/s²].
         attract: its acceleration (nv,) [rad/s² or m/s²].
         out: overwritten (nv,).
     """
     nv = nonlinear.shape[0]
-    acceleration_limit, effort_limit, zero = workspace[0], workspace[1], workspace[2]
-    brake_torque, attract_torque = workspace[3], workspace[4]
+    acceleration_limit, effort_limit = limits_and_parts[0], limits_and_parts[1]
+    zero, brake_torque = limits_and_parts[2], limits_and_parts[3]
+    attract_torque = limits_and_parts[4]
     gamma, beta = _shares(zero, brake, attract, acceleration_limit)
     for i in range(nv):
         brake_torque[i] = attract_torque[i] = 0.0
