@@ -12,15 +12,19 @@ counts as reached, and changes below the tolerances (1e-9 of start and replay).
 import argparse
 import sys
 from collections import Counter
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from itertools import cycle, islice
 from pathlib import Path
 
 import numpy as np
-from tampering import KINDS, NotPossibleError
+from tampering import KINDS, Kind, NotPossibleError
 
 import densarm
-from densarm.cli.json_file import write_json
+from densarm import Run
+from densarm.cli.output import write_json
+
+Seed = int | tuple[int, int]
 
 _ATTEMPTS = 60  # to find a run that can be made to fail in a given way
 
@@ -37,11 +41,13 @@ class Tally:
     false_certificates: list[str] = field(default_factory=list)
 
 
-def tampered(kind, runs, rng):
+def tampered(
+    kind: Kind, runs: Sequence[Run], rng: np.random.Generator
+) -> Run | densarm.DensarmError | None:
     """Return a run made to fail, or the error by which its file was refused."""
     for _ in range(_ATTEMPTS):
         try:
-            return kind.tamper(runs[rng.integers(len(runs))], rng)
+            return kind.tamper(runs[int(rng.integers(len(runs)))], rng)
         except NotPossibleError:
             continue
         except densarm.DensarmError as error:
@@ -49,7 +55,7 @@ def tampered(kind, runs, rng):
     return None
 
 
-def judge(name, runs, seed, tally):
+def judge(name: str, runs: Sequence[Run], seed: Seed, tally: Tally) -> None:
     """Tamper with a run in one way and count what its certificate says."""
     kind, rng = KINDS[name], np.random.default_rng(seed)
     result = tampered(kind, runs, rng)
@@ -60,15 +66,15 @@ def judge(name, runs, seed, tally):
         tally.refused += 1
         tally.as_meant += kind.part == "file"
         return
-    certificate = result.verify()
+    certificate = result.certificate
     failing = {check.name for check in certificate.checks if not check.holds}
     tally.refused += not certificate.certified
     tally.as_meant += kind.part in failing
     if certificate.certified:
-        tally.false_certificates.append(f"{result.scenario.name}, seed {seed}")
+        tally.false_certificates.append(f"{result.task.name}, seed {seed}")
 
 
-def false_certificates(runs, count, seed=0):
+def false_certificates(runs: Sequence[Run], count: int, seed: int = 0) -> dict[str, Tally]:
     """Return a tally for each kind of tampering with certified runs."""
     tallies = {name: Tally() for name in KINDS}
     for k, name in enumerate(islice(cycle(KINDS), count)):
@@ -78,9 +84,9 @@ def false_certificates(runs, count, seed=0):
     return tallies
 
 
-def report(tallies):
+def report(tallies: dict[str, Tally]) -> dict[str, int]:
     print(f"\n{'made to fail by':<28}{'part':<10}{'runs':>6}{'refused':>9}{'by it':>7}{'false':>7}")
-    total = Counter()
+    total: Counter[str] = Counter()
     for name, tally in tallies.items():
         counts = {
             "runs": tally.runs,
@@ -97,7 +103,7 @@ def report(tallies):
     return dict(total)
 
 
-def main():
+def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--runs", type=int, default=1000)
     parser.add_argument("--seed", type=int, default=0)
@@ -106,10 +112,10 @@ def main():
     )
     parser.add_argument("--json", type=Path)
     options = parser.parse_args()
-    runs = [densarm.simulate(densarm.load_scenario(name)) for name in options.scenarios]
+    runs = [densarm.run(name) for name in options.scenarios]
     for run in runs:
         if not run.certified:
-            sys.exit(f"{run.scenario.name}: not certified to begin with")
+            sys.exit(f"{run.task.name}: not certified to begin with")
     tallies = false_certificates(runs, options.runs, options.seed)
     total = report(tallies)
     for name, tally in tallies.items():

@@ -16,7 +16,9 @@ import time
 import traceback
 import warnings
 from pathlib import Path
+from random import Random
 from tempfile import TemporaryDirectory
+from typing import Any
 
 from fuzzing import mutations
 from fuzzing.targets import NAMES, targets
@@ -25,7 +27,7 @@ from hypothesis import HealthCheck, Phase, given, seed, settings
 from hypothesis import strategies as st
 
 import densarm
-from densarm.cli.json_file import write_json
+from densarm.cli.output import write_json
 
 _SECONDS = 20.0  # that an example may take, on a busy machine
 _MEGABYTES = 1024
@@ -67,7 +69,7 @@ class Campaign:
             suppress_health_check=list(HealthCheck),
         )
         @given(st.data(), st.randoms(use_true_random=False), st.sampled_from(self._target.seeds))
-        def each(data, random, content):
+        def each(data: st.DataObject, random: Random, content: bytes) -> None:
             try:
                 example = self._example(data, random, content)
             except (ArithmeticError, LookupError, TypeError, ValueError):
@@ -77,7 +79,7 @@ class Campaign:
 
         each()
 
-    def _example(self, data, random, content: bytes) -> bytes:
+    def _example(self, data: st.DataObject, random: Random, content: bytes) -> bytes:
         kind = random.random()
         if kind < 0.6:
             return self._target.mutate(content, random, data.draw)
@@ -116,14 +118,14 @@ def child(name: str, minutes: float, first_seed: int, folder: Path) -> None:
     print(json.dumps({**counts, "failures": campaign.failures}))
 
 
-def supervised(name: str, minutes: float, first_seed: int) -> dict:
+def supervised(name: str, minutes: float, first_seed: int) -> dict[str, Any]:
     """Run one campaign in a process of its own, and note if it hangs or dies."""
     with TemporaryDirectory() as folder:
         command = [sys.executable, __file__, "--child", name, "--folder", folder]
         command += ["--minutes", str(minutes), "--seed", str(first_seed)]
         done = subprocess.run(command, capture_output=True, text=True, check=False)
         if done.returncode == 0:
-            return json.loads(done.stdout.splitlines()[-1])
+            return dict(json.loads(done.stdout.splitlines()[-1]))
         inputs = [path.read_bytes().hex() for path in Path(folder).glob("input.*")]
         failure = {"input": "".join(inputs), "traceback": done.stderr[-3000:]}
         return {"parsed": 0, "refused": 0, "failures": {f"ended with {done.returncode}": failure}}

@@ -2,16 +2,15 @@
 
     python benchmarks/long_run.py --steps 1000000 --json long_run.json
 
-Panda moves among spheres, each second to a new goal; the controller for it is made in the control
-loop, within the step that begins there. Each step waits for its time at 1 kHz, asleep and for the
-last bit awake. It misses its deadline if its torque is there more than a period later; the next
-steps are then put off by as much. Processor time tells what of that is the step's own and what the
-machine's; `--fifo` gives the process the priority that a control loop has on a robot. The plant is
-densarm's own, stepped after each torque.
+Panda moves among spheres, each second to another goal of a round; the controllers for them are made
+beforehand, and change within the step that begins there. Each step waits for its time at 1 kHz,
+asleep and for the last bit awake. It misses its deadline if its torque is there more than a period
+later; the next steps are then put off by as much. Processor time tells what of that is the step's
+own and what the machine's; `--fifo` gives the process the priority that a control loop has on a
+robot. The plant is densarm's own, stepped after each torque.
 """
 
 import argparse
-import itertools
 import os
 import time
 from collections.abc import Iterator
@@ -24,33 +23,32 @@ from timing.priority import add_fifo_option, take_priority
 from timing.spread import Spread
 from timing.surroundings import print_surroundings, surroundings
 
-from densarm.arm import load_arm
-from densarm.arrays import Array
-from densarm.bench.step import full_sensing_density
-from densarm.bench.swing_among_spheres import clearance_among_spheres, swing
-from densarm.cli.json_file import write_json
-from densarm.control.density_tracking import DensityTracking
-from densarm.control.gains import Gains
-from densarm.reference.reference import Reference
-from densarm.simulation.plant import Integrator, PinocchioPlant
+from densarm.arms.arm import load_arm
+from densarm.certificates.task import Integrator
+from densarm.cli.output import write_json
+from densarm.planning.motion import Motion
+from densarm.simulation.plants import PinocchioPlant
+from densarm.study.step import full_sensing_controller, swing, world_among_spheres
+from densarm.values.arrays import Array
 
 PERIOD = 0.001  # [s]
 LEG = 1000  # steps to a goal
+GOALS = 10  # of a round
 SHARES = (0.2, 0.8)  # of the swing, between which goals lie
 AWAKE = 1e-4  # the last bit of a wait [s]
 PARTS = 10  # of the run, compared with each other
 
 
-def references(swinging: Reference, seed: int) -> Iterator[Reference]:
-    """Yield motions from rest to rest, each from the goal of the one before to one at random."""
+def motions(swinging: Motion, seed: int) -> Iterator[Motion]:
+    """Yield motions from rest to rest, each to a goal at random, and the last to the first one."""
     random = np.random.default_rng(seed)
     low, high = swinging.position[0], swinging.position[-1]
     s = np.linspace(0.0, 1.0, LEG + 1)[:, np.newaxis]
     position = s**3 * (10.0 - 15.0 * s + 6.0 * s**2)
     velocity = 30.0 * (s * (1.0 - s)) ** 2 / (LEG * PERIOD)
-    goals = (low + (high - low) * random.uniform(*SHARES) for _ in itertools.count())
-    for start, goal in itertools.pairwise(goals):
-        yield Reference(PERIOD, start + (goal - start) * position, (goal - start) * velocity)
+    goals = [low + (high - low) * random.uniform(*SHARES) for _ in range(GOALS)]
+    for start, goal in zip(goals, [*goals[1:], goals[0]], strict=True):
+        yield Motion(PERIOD, start + (goal - start) * position, (goal - start) * velocity)
 
 
 class Steps:
@@ -65,7 +63,7 @@ class Steps:
         self.lateness: Array = np.full(count, np.nan)
         """Of the torque, after the step's time [s]."""
         self.error: Array = np.full(count, np.nan)
-        """Largest distance of a joint from the reference [rad]."""
+        """Largest distance of a joint from the motion [rad]."""
 
 
 @dataclass
@@ -82,27 +80,25 @@ def run(count: int, pairs: int, seed: int = 0) -> tuple[Steps, Memory]:
     """Run so many steps of 1 kHz."""
     arm = load_arm("panda")
     swinging = swing(arm)
-    clearance = clearance_among_spheres(arm, swinging, pairs)
+    world = world_among_spheres(arm, swinging, pairs)
     plant = PinocchioPlant(arm, PERIOD, Integrator.SEMI_IMPLICIT_EULER)
-    density = full_sensing_density(clearance, arm.configuration(swinging.position[-1]))
-    legs = references(swinging, seed)
-    q, v = next(references(swinging, seed)).position[0], np.zeros(arm.nv)
-    DensityTracking(arm, density, next(references(swinging, seed)), Gains()).torque(0.0, q, v)
+    legs = [full_sensing_controller(world, motion) for motion in motions(swinging, seed)]
+    q, v = legs[0].motion.position[0], np.zeros(arm.nv)
+    for controller in legs:  # so that pairs sleep that are far away
+        controller.torque(0.0, arm.configuration(controller.motion.position[0]), v)
     steps, memory = Steps(count), Memory()
     due = time.perf_counter()
     for k in range(count):
         late = _wait(due)
         began, processor = time.perf_counter(), time.thread_time()
-        if k % LEG == 0:
-            reference = next(legs)
-            controller = DensityTracking(arm, density, reference, Gains())
+        controller = legs[k // LEG % GOALS]
         tau = controller.torque(k % LEG * PERIOD, q, v)
         steps.processor[k] = time.thread_time() - processor
         steps.elapsed[k] = time.perf_counter() - began
         steps.lateness[k] = late + steps.elapsed[k]
         due += max(PERIOD, steps.lateness[k])
         q, v = plant.step(q, v, tau)
-        steps.error[k] = np.abs(q - reference.position[k % LEG + 1]).max()
+        steps.error[k] = np.abs(q - controller.motion.position[k % LEG + 1]).max()
         if k == count // PARTS:
             memory.early = _resident()
     memory.late = _resident()
@@ -127,7 +123,7 @@ def report(steps: Steps, memory: Memory) -> dict[str, Any]:
 
 def print_report(found: dict[str, Any]) -> None:
     count, missed = found["steps"], found["missed"]
-    print(f"{count} steps at 1 kHz, {-(-count // LEG)} goals")
+    print(f"{count} steps at 1 kHz, {-(-count // LEG)} motions")
     print(
         f"missed deadlines       {missed} ({100.0 * missed / count:.4f} %), of them"
         f" {found['missed_by_own_work']} by the step's own processor time"

@@ -2,7 +2,7 @@
 
 python benchmarks/more_room.py --fifo --json more_room.json
 
-Panda tracks a reference among spheres. A thread makes a clearance with as many spare spheres, and a
+Panda tracks a motion among spheres. A thread makes a world with as many spare spheres, and a
 controller for it, which then takes over between two steps: its obstacles are brought up to date and
 one is added. One thread at a time runs Python; another that waits gets its turn after the switch
 interval, or when a call of Pinocchio or coal returns, none of which is interrupted.
@@ -19,14 +19,14 @@ from timing.priority import add_fifo_option, take_priority
 from timing.spread import Spread
 from timing.surroundings import print_surroundings, surroundings
 
-from densarm.arm import load_arm
-from densarm.bench.step import full_sensing_controller
-from densarm.bench.swing_among_spheres import clearance_among_spheres, swing
-from densarm.clearance import Clearance
-from densarm.cli.json_file import write_json
-from densarm.control.density_tracking import DensityTracking
-from densarm.reference.reference import Reference
-from densarm.scene import Scene, Sphere
+from densarm.arms.arm import load_arm
+from densarm.cli.output import write_json
+from densarm.control.tracking import DensityTracking
+from densarm.planning.motion import Motion
+from densarm.scene.obstacles import Sphere
+from densarm.scene.scene import Scene
+from densarm.study.step import full_sensing_controller, swing, world_among_spheres
+from densarm.world.world import World
 
 PERIOD = 0.001  # [s]
 STEPS = 200  # with the thread, and as many without
@@ -35,13 +35,11 @@ STEPS = 200  # with the thread, and as many without
 class Loop:
     """A loop at 1 kHz, and what it tells of its steps."""
 
-    def __init__(self, clearance: Clearance, reference: Reference) -> None:
-        self.clearance, self.reference = clearance, reference
-        arm = clearance.arm
-        self.states = list(
-            zip(arm.configurations(reference.position), reference.velocity, strict=True)
-        )
-        self.controller = full_sensing_controller(clearance, reference)
+    def __init__(self, world: World, motion: Motion) -> None:
+        self.world, self.motion = world, motion
+        q = world.arm.configurations(motion.position)
+        self.states = list(zip(q, motion.velocity, strict=True))
+        self.controller = full_sensing_controller(world, motion)
 
     def step(self, k: int) -> None:
         self.controller.torque(k * PERIOD, *self.states[k % len(self.states)])
@@ -61,24 +59,24 @@ def measure(pairs: int, interval: float, rounds: int) -> dict[str, Any]:
     """Measure with so many pairs in the end, half of them spare."""
     sys.setswitchinterval(interval)
     arm = load_arm("panda")
-    reference = swing(arm)
-    scene = clearance_among_spheres(arm, reference, pairs // 2).scene
+    motion = swing(arm)
+    scene = world_among_spheres(arm, motion, pairs // 2).scene
     spare = [Sphere(name=f"spare_{k}", radius=0.05) for k in range(len(scene))]
     found: dict[str, list[float]] = {key: [] for key in KEYS}
-    made: list[tuple[Clearance, DensityTracking]] = []
+    made: list[tuple[World, DensityTracking]] = []
 
     def make(loop: Loop, scene: Scene) -> None:
         began = time.thread_time()
-        larger = Clearance(arm, scene, spare)
-        controller = full_sensing_controller(larger, reference)
+        larger = World(arm, scene, spare)
+        controller = full_sensing_controller(larger, motion)
         controller.torque(0.0, *loop.states[-1])  # so that pairs sleep that are far from there
         made.append((larger, controller))
         found["making_ms"].append(1e3 * (time.thread_time() - began))
 
     for _ in range(rounds):
-        loop = Loop(Clearance(arm, scene), reference)
+        loop = Loop(World(arm, scene), motion)
         found["quiet_ms"].append(1e3 * max(loop.lateness()))
-        thread = Thread(target=make, args=[loop, loop.clearance.scene])
+        thread = Thread(target=make, args=[loop, loop.world.scene])
         thread.start()
         found["late_ms"].append(1e3 * max(loop.lateness()))
         thread.join()
@@ -89,15 +87,15 @@ def measure(pairs: int, interval: float, rounds: int) -> dict[str, Any]:
 
 
 def swap(
-    loop: Loop, larger: Clearance, controller: DensityTracking, found: dict[str, list[float]]
+    loop: Loop, larger: World, controller: DensityTracking, found: dict[str, list[float]]
 ) -> None:
-    loop.clearance.move_obstacle(loop.clearance.scene.obstacles[0].name, (0.0, 0.0, 2.0))
+    loop.world.move_obstacle(loop.world.scene.obstacles[0].name, (0.0, 0.0, 2.0))
     new = Sphere(name="new", radius=0.05, position=(0.0, 0.0, 2.2))
-    old = loop.clearance, loop.controller  # to let go of them takes time, which is not the loop's
+    old = loop.world, loop.controller  # to let go of them takes time, which is not the loop's
     began = time.perf_counter()
-    larger.change_to(loop.clearance.scene)
+    larger.change_to(loop.world.scene)
     larger.add_obstacle(new)
-    loop.clearance, loop.controller = larger, controller
+    loop.world, loop.controller = larger, controller
     swapped = time.perf_counter()
     loop.step(len(loop.states) - 1)
     found["swap_us"].append(1e6 * (swapped - began))

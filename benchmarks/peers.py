@@ -96,7 +96,7 @@ def main(arguments: list[str] | None = None) -> None:
 
     from control_steps.comparison import PACKAGES, compare
 
-    from densarm.cli.json_file import write_json
+    from densarm.cli.output import write_json
 
     peers = _available(options.peers, PACKAGES)
     result: dict[str, Any] = {"surroundings": surroundings(VERSIONS), "comparisons": []}

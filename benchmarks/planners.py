@@ -13,6 +13,7 @@ Clearance is that of the motion itself; a motion that touches ends there and cou
 """
 
 import argparse
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -20,26 +21,27 @@ import numpy as np
 from plain_pipeline.track import plain_pipeline
 from timing.surroundings import print_surroundings, surroundings
 
-from densarm.bench.problem import Problem, as_problems
-from densarm.cli.json_file import write_json
-from densarm.closed_loop import run_closed_loop, simulate
-from densarm.scene_files import load_problems
-from densarm.trajectory import Trajectory
+from densarm.cli.output import write_json
+from densarm.scenarios.run import run, run_by
+from densarm.scenarios.scenario import Scenario
+from densarm.scene.loading import MotionProblem, load_problems
+from densarm.simulation.run import Run
+from densarm.study.problems import scenario_of
 
 VERSIONS = ("pin", "coal", "ompl", "toppra", "numpy", "scipy")
-PIPELINES = {
-    "densarm": simulate,
-    "OMPL, TOPP-RA, computed torque": lambda scenario: run_closed_loop(scenario, plain_pipeline),
+PIPELINES: dict[str, Callable[[Scenario], Run]] = {
+    "densarm": run,
+    "OMPL, TOPP-RA, computed torque": lambda scenario: run_by(scenario, plain_pipeline),
 }
 
 
-def row(problem: Problem, run: Trajectory) -> dict[str, Any]:
+def row(problem: MotionProblem, run: Run) -> dict[str, Any]:
     return {
         "scene": problem.scene_name,
         "index": problem.index,
         "outcome": str(run.outcome),
         "detail": run.detail,
-        "plan_time_s": run.plan_time,
+        "preparation_time_s": run.preparation_time,
         "duration_s": float(run.time[-1]),
         "min_clearance_m": float(run.clearance.min()),
     }
@@ -54,7 +56,7 @@ def summary(rows: list[dict[str, Any]]) -> dict[str, Any]:
         "contacts": sum(r["outcome"] == "collided" for r in rows),
         **{
             key: np.percentile([r[key] for r in reached], [5, 50, 95]).tolist() if reached else None
-            for key in ("plan_time_s", "duration_s", "min_clearance_m")
+            for key in ("preparation_time_s", "duration_s", "min_clearance_m")
         },
         "smallest_clearance_m": min((r["min_clearance_m"] for r in rows), default=None),
     }
@@ -69,7 +71,7 @@ def print_summary(name: str, found: dict[str, Any]) -> None:
 
     print(
         f"{name:32}{found['reached']:4} of {found['problems']:<4}{found['contacts']:9}"
-        f"{spread('plan_time_s', 1.0, 2):>22}{spread('duration_s', 1.0, 2):>20}"
+        f"{spread('preparation_time_s', 1.0, 2):>22}{spread('duration_s', 1.0, 2):>20}"
         f"{spread('min_clearance_m', 1e3, 1):>20}{1e3 * found['smallest_clearance_m']:12.2f}"
     )
 
@@ -84,7 +86,7 @@ def ratios(rows: dict[str, list[dict[str, Any]]]) -> dict[str, float]:
     ]
     return {
         key: float(np.median([b[key] / a[key] for a, b in both]))
-        for key in ("plan_time_s", "duration_s", "min_clearance_m")
+        for key in ("preparation_time_s", "duration_s", "min_clearance_m")
         if both
     }
 
@@ -97,13 +99,13 @@ def main(arguments: list[str] | None = None) -> None:
     options = parser.parse_args(arguments)
     around = surroundings(VERSIONS)
     print_surroundings(around)
-    problems = as_problems(load_problems(options.problems)[:: options.every])
+    problems = load_problems(options.problems)[:: options.every]
     for pipeline in PIPELINES.values():
-        pipeline(problems[0].scenario())  # unrecorded: it imports and compiles
+        pipeline(scenario_of(problems[0]))  # unrecorded: it imports and compiles
     rows: dict[str, list[dict[str, Any]]] = {name: [] for name in PIPELINES}
     for problem in problems:
         for name, pipeline in PIPELINES.items():
-            rows[name].append(row(problem, pipeline(problem.scenario())))
+            rows[name].append(row(problem, pipeline(scenario_of(problem))))
     print(
         f"{'median (5-95 %)':32}{'reached':>12}{'contacts':>9}{'first motion [s]':>22}"
         f"{'motion [s]':>20}{'clearance [mm]':>20}{'least [mm]':>12}"

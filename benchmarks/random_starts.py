@@ -16,18 +16,15 @@ from pathlib import Path
 import numpy as np
 
 import densarm
-from densarm.bench.problem_result import ProblemResult
-from densarm.bench.problem_results import ProblemResults, problem_result
-from densarm.bench.processes import in_processes
-from densarm.clear_configurations import clear_configurations
-from densarm.clearance import Clearance
-from densarm.cli.problem_table import print_problem_sets
+from densarm.cli.bench import print_problem_sets
+from densarm.study.problems import ProblemResult, ProblemResults, in_processes, problem_result
+from densarm.world.configurations import clear_configurations
 
 
 def run(name: str, guide: str, item: tuple[int, np.ndarray]) -> ProblemResult:
     index, start = item
     scenario = replace(densarm.load_scenario(name), start=start)
-    return problem_result(name, index, partial(densarm.simulate, scenario, guide))
+    return problem_result(name, index, partial(densarm.run, scenario, guide))
 
 
 def main() -> int:
@@ -40,9 +37,8 @@ def main() -> int:
     parser.add_argument("--json", type=Path)
     options = parser.parse_args()
     scenario = densarm.load_scenario(options.scenario)
-    clearance = Clearance(scenario.arm, scenario.scene)
     starts = clear_configurations(
-        clearance, options.starts, options.seed, room=scenario.control.margin
+        scenario.world, options.starts, options.seed, scenario.control.margin
     )
     work = partial(run, options.scenario, options.guide)
     results = ProblemResults(tuple(in_processes(work, list(enumerate(starts)), options.jobs)))

@@ -15,7 +15,7 @@ import time
 from pathlib import Path
 from typing import Any
 
-from densarm.catalogue import scenario_paths
+from densarm.arms.catalogue import scenario_paths
 
 
 def run(name: str, seed: int, file: Path) -> dict[str, Any]:

@@ -14,12 +14,17 @@ import argparse
 import json
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pinocchio as pin
+from numpy.typing import NDArray
 
 import densarm
-from densarm.catalogue import scenario_paths
+from densarm import Run
+from densarm.arms.catalogue import scenario_paths
+from densarm.scenarios.scenario import ControlForm
+from densarm.values.arrays import Array
 
 COUNTED = 0.01  # share of the acceleration limit that a sign must have
 SLOW = 0.02  # [rad/s]
@@ -27,7 +32,7 @@ NEAR = 0.02  # [m]
 STEP = 0.2  # of the acceleration limit
 
 
-def sign_changes(a, limit, where, dt):
+def sign_changes(a: Array, limit: Array, where: NDArray[np.bool_], dt: float) -> float | None:
     """Per second of the samples where it is asked for; None without any."""
     if not where.any():
         return None
@@ -36,12 +41,12 @@ def sign_changes(a, limit, where, dt):
         seen = np.flatnonzero((np.abs(a[:, j]) > COUNTED * limit[j]) & where)
         turns = np.diff(np.sign(a[seen, j])) != 0
         count += int((turns & (np.diff(seen) <= 20)).sum())
-    return count / (where.sum() * dt)
+    return float(count / (where.sum() * dt))
 
 
-def torque_steps(run):
+def torque_steps(run: Run) -> Array:
     """The step of the torque at each sample as one of acceleration, in units of its limit (N,)."""
-    arm = run.scenario.arm
+    arm = run.task.arm
     steps = np.zeros(len(run.time) - 2)
     for k in range(1, len(run.time) - 1):
         data = arm.data
@@ -52,8 +57,8 @@ def torque_steps(run):
     return steps
 
 
-def counts(run):
-    dt, limits = run.scenario.simulation.dt, run.scenario.arm.limits
+def counts(run: Run) -> dict[str, Any]:
+    dt, limits = run.task.simulation.dt, run.task.arm.limits
     a = np.diff(run.v, axis=0) / dt
     slow, near = np.abs(run.v[1:]).max(axis=1) < SLOW, run.clearance[1:] < NEAR
     steps = torque_steps(run)
@@ -71,18 +76,18 @@ def counts(run):
     }
 
 
-def main():
+def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--scenarios", nargs="+", default=sorted(scenario_paths()))
     parser.add_argument("--json", metavar="FILE")
     args = parser.parse_args()
-    rows = []
+    rows: list[dict[str, Any]] = []
     for name in args.scenarios:
         scenario = densarm.load_scenario(name)
-        for form in densarm.ControlForm:
+        for form in ControlForm:
             try:
                 control = replace(scenario.control, form=form)
-                run = densarm.simulate(replace(scenario, control=control))
+                run = densarm.run(replace(scenario, control=control))
             except densarm.DensarmError as error:
                 print(f"{scenario.name}, {form}: {error}")
                 continue

@@ -12,14 +12,15 @@ the least time of each state in all its visits.
 
 import argparse
 from concurrent.futures import ProcessPoolExecutor
+from dataclasses import asdict
 from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
 from timing.surroundings import print_surroundings, surroundings
 
-from densarm.bench.step import time_step
-from densarm.cli.json_file import write_json
+from densarm.cli.output import write_json
+from densarm.study.step import time_step
 
 PAIRS = [8, 16, 32, 64, 128, 256, 512, 1024]
 
@@ -27,7 +28,7 @@ PAIRS = [8, 16, 32, 64, 128, 256, 512, 1024]
 def measure(shapes: str, pairs: int, steps: int) -> dict[str, Any]:
     with ProcessPoolExecutor(1, get_context("spawn")) as process:
         timing = process.submit(time_step, "panda", shapes, pairs, steps).result()
-    return {"shapes": shapes, **timing.to_json()}
+    return {"shapes": shapes, **asdict(timing)}
 
 
 def print_row(row: dict[str, Any]) -> None:

@@ -1,7 +1,7 @@
 """Compare planned motions with the fastest ones along the same paths.
 
-Prints, for each scenario, the time of the run, that of its reference, and the time-optimal one by
-TOPP-RA: same path, all of the limits, no regard to stopping.
+Prints, for each scenario, the time of the run, that of its planned motion, and the time-optimal one
+by TOPP-RA: same path, all of the limits, no regard to stopping.
 
     python benchmarks/time_optimality.py [SCENARIO ...]
 """
@@ -12,35 +12,42 @@ from unittest.mock import patch
 import numpy as np
 
 import densarm
-from densarm.reference import timing
-from densarm.reference.timing_parameters import TimingParameters
+from densarm import Arm
+from densarm.planning import timing
+from densarm.planning.smoothing import SmoothPath
+from densarm.study.problems import motion_time
+from densarm.world.stopping import StoppingCheck
 
-ALL = TimingParameters(velocity_share=1.0, acceleration_share=1.0, torque_share=1.0)
+ALL = densarm.TimingParameters(velocity_share=1.0, acceleration_share=1.0, torque_share=1.0)
 
 
 def times(name: str) -> tuple[float, float, float]:
-    """Return the durations of the run, of its reference and of the fastest reference [s]."""
-    found = {}
+    """Return the durations of the run, of its planned motion and of the fastest one [s]."""
+    found: dict[str, float] = {}
 
-    def remember(arm, path, length, period, parameters, stopping=None):
-        reference = time_path(arm, path, length, period, parameters, stopping)
-        found["planned"] = reference.duration
+    def remember(
+        arm: Arm,
+        path: SmoothPath,
+        length: float,
+        period: float,
+        parameters: densarm.TimingParameters,
+        stopping: StoppingCheck | None = None,
+    ) -> densarm.Motion:
+        motion = time_path(arm, path, length, period, parameters, stopping)
+        found["planned"] = motion.duration
         found["fastest"] = time_path(arm, path, length, period, ALL).duration
-        return reference
+        return motion
 
     time_path = timing.time_path
     with patch.object(timing, "time_path", remember):
-        run = densarm.simulate(densarm.load_scenario(name))
-    arrived = np.abs(run.scenario.arm.difference(run.q, run.scenario.goal)).max(axis=1) <= 0.01
-    arrived &= np.abs(run.v).max(axis=1) <= 0.01
-    last_away = int(np.flatnonzero(~arrived)[-1])
-    return float(run.time[last_away + 1]), found["planned"], found["fastest"]
+        run = densarm.run(name)
+    return motion_time(run), found["planned"], found["fastest"]
 
 
 def main(names: list[str]) -> None:
     """Print one line for each scenario, and the median."""
     ratios = []
-    print(f"{'scenario':<16}{'run':>10}{'reference':>12}{'optimal':>10}{'run / optimal':>16}")
+    print(f"{'scenario':<16}{'run':>10}{'planned':>12}{'optimal':>10}{'run / optimal':>16}")
     for name in names:
         run, planned, fastest = times(name)
         ratios.append(run / fastest)

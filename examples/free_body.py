@@ -18,36 +18,30 @@ WALL = {  # around a window of 0.4 m by 0.4 m: position and size [m]
 
 def main(out: Path) -> None:
     bar = densarm.free_body(
-        densarm.Box(name="bar", size=(0.06, 0.6, 0.06)),  # [m]
+        densarm.Box(name="bar", size=[0.06, 0.6, 0.06]),  # [m]
         "rigid body",
         bounds=[(-0.8, 0.8), (-0.5, 0.5), (-0.5, 0.5)],  # [m]
         name="bar",
     )
-    scenario = densarm.Scenario(
-        name="window",
-        title="Turn a bar to fit through a window",
-        arm=bar,
-        scene=densarm.Scene(
-            densarm.Box(name=name, position=position, size=size)
-            for name, (position, size) in WALL.items()
-        ),
-        start=bar.configuration([-0.6, 0.0, 0.0, 0.0, 0.0, 0.0]),  # [m], [rad]
-        goal=bar.configuration([0.6, 0.0, 0.0, 0.0, 0.0, 1.5]),  # [m], [rad]
-        simulation=densarm.SimulationParameters(dt=0.005),  # [s]
-    )
+    wall = [
+        densarm.Box(name=name, position=position, size=size)
+        for name, (position, size) in WALL.items()
+    ]
+    world = densarm.World(bar, densarm.Scene(wall))
+    start = bar.configuration([-0.6, 0.0, 0.0, 0.0, 0.0, 0.0])  # [m], [rad]
+    goal = bar.configuration([0.6, 0.0, 0.0, 0.0, 0.0, 1.5])  # [m], [rad]
+    steps = densarm.SimulationParameters(dt=0.005)  # [s]
 
-    clearance = densarm.Clearance(bar, scenario.scene)
-    plan = densarm.plan_motion(scenario, clearance, "path")
-    if isinstance(plan, densarm.NoPath):
-        raise SystemExit(plan.reason)
-    plant = densarm.SingleIntegrator(bar, scenario.simulation.dt)
-    motion = densarm.FixedStepLoop(bar, plant, scenario.simulation).run(
-        densarm.make_velocity_controller(scenario, plan), scenario.start, scenario.goal
-    )
-    proof = densarm.SweptCheck(plan.bound).check(motion.q)
-    print(f"by velocity: {motion.end.name.lower()} after {motion.time[-1]:.2f} s, {proof.verdict}")
+    path = densarm.plan_path(world, start, goal).path
+    regulation = densarm.DensityRegulation(world, goal, path=path, period=steps.dt)
+    plant = densarm.SingleIntegrator(bar, steps.dt)
+    run = densarm.simulate(world, regulation, start, plant=plant, parameters=steps)
+    swept = run.certificate.checks[0]
+    print(f"by velocity: {run.outcome} after {run.time[-1]:.2f} s, {swept.detail}")
 
-    run = densarm.simulate(scenario)
+    motion = densarm.plan_motion(world, start, goal, period=steps.dt)
+    tracking = densarm.DensityTracking(world, motion)
+    run = densarm.simulate(world, tracking, start, parameters=steps)
     print(f"by force: {run.outcome} after {run.time[-1]:.2f} s, certified: {run.certified}")
     print(f"clearance at least {run.clearance.min() * 1e3:.1f} mm")
     densarm.save_html(run, out / "free_body.html")

@@ -16,23 +16,21 @@ SETTLING = 0.3  # [s]
 def main() -> None:
     scenario = densarm.load_scenario("panda_shelf")
     arm = scenario.arm
-    clearance = densarm.Clearance(arm, scenario.scene)
-    plan = densarm.plan_motion(scenario, clearance, scenario.control.guide)
-    if isinstance(plan, densarm.NoPath):
-        raise SystemExit(plan.reason)
-    controller = densarm.make_controller(scenario, plan)
-    controller = densarm.GuardedController(arm, controller, period=DT)
+    world = scenario.world
+    motion = densarm.plan_motion(world, scenario.start, scenario.goal, period=DT)
+    controller = densarm.DensityTracking(world, motion)
+    supervisor = densarm.Supervisor(arm, controller, period=DT)
 
     data = arm.model.createData()
     q, v = scenario.start, np.zeros(arm.nv)  # [rad], [rad/s]
     smallest = np.inf  # [m]
-    for k in range(int((plan.reference.duration + SETTLING) / DT)):
-        tau = controller.torque(k * DT, q, v)  # [N·m]
+    for k in range(int((motion.duration + SETTLING) / DT)):
+        tau = supervisor.torque(k * DT, q, v)  # [N·m]
         a = pin.aba(arm.model, data, q, v, tau - FRICTION * v)  # [rad/s²]
         q, v = pin.integrate(arm.model, q, v * DT), v + a * DT
-        smallest = min(smallest, clearance.distances(q).min())
+        smallest = min(smallest, float(world.distances(q).min()))
 
-    print(controller.status.sentence)
+    print(supervisor.status.sentence)
     error = np.abs(arm.difference(scenario.goal, q)).max()
     print(f"{error:.1e} rad from the goal, clearance at least {smallest * 1e3:.1f} mm")
 

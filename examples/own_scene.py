@@ -13,30 +13,25 @@ def main(out: Path) -> None:
     held = densarm.Attachment(
         densarm.Box(name="parcel", size=[0.1, 0.1, 0.15], position=[0.0, 0.0, 0.08]),  # [m]
         link="tool0",
-        touch_links=("wrist_3_link",),
+        touch_links=["wrist_3_link"],
         mass=0.8,  # [kg]
     )
     arm = densarm.load_arm("ur5").holding(held)
     moveit = densarm.load_scene(Path(__file__).with_name("workbench.scene"))
     table = densarm.HalfSpace(name="table")  # all that lies below z = 0
-    scenario = densarm.Scenario(
-        name="workbench",
-        title="Carry a parcel past a rack",
-        arm=arm,
-        scene=densarm.Scene([*moveit, table]),
-        start=arm.configuration([0.7, -1.2, 1.8, -2.17, -1.57, 0.0]),  # [rad]
-        goal=arm.configuration([-0.8, -1.2, 1.8, -2.17, -1.57, 0.0]),  # [rad]
-    )
+    world = densarm.World(arm, densarm.Scene([*moveit, table]))
+    start = arm.configuration([0.7, -1.2, 1.8, -2.17, -1.57, 0.0])  # [rad]
+    goal = arm.configuration([-0.8, -1.2, 1.8, -2.17, -1.57, 0.0])  # [rad]
 
-    clearance = densarm.Clearance(arm, scenario.scene)
-    for place in ("start", "goal"):
-        sample = clearance.evaluate(getattr(scenario, place))
+    for name, q in (("start", start), ("goal", goal)):
+        sample = world.clearance(q)
         k = sample.distance.argmin()
-        print(f"{place}: {sample.distance[k] * 1e3:.0f} mm between {' and '.join(sample.pairs[k])}")
+        print(f"{name}: {sample.distance[k] * 1e3:.0f} mm between {' and '.join(sample.pairs[k])}")
 
-    run = densarm.simulate(scenario)
+    motion = densarm.plan_motion(world, start, goal)
+    run = densarm.simulate(world, densarm.DensityTracking(world, motion), start)
     print(f"{run.outcome} after {run.time[-1]:.2f} s, certified: {run.certified}")
-    print(f"{clearance.n_pairs} pairs, never closer than {run.clearance.min() * 1e3:.1f} mm")
+    print(f"{world.n_pairs} pairs, never closer than {run.clearance.min() * 1e3:.1f} mm")
     densarm.save_picture(run, out / "own_scene.png")
 
 

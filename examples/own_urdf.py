@@ -18,21 +18,14 @@ def main(out: Path) -> None:
     for pair in arm.excluded_pairs:
         print(f"not checked against each other: {' and '.join(pair.shapes)}, {pair.reason}")
 
-    scenario = densarm.Scenario(
-        name="over_the_wall",
-        title="Lift a SCARA arm's quill over a wall",
-        arm=arm,
-        scene=densarm.Scene(
-            [
-                densarm.HalfSpace(name="floor"),
-                densarm.Box(name="wall", size=[0.3, 0.02, 0.2], position=[0.45, 0.0, 0.1]),  # [m]
-            ]
-        ),
-        start=arm.configuration([-0.9, 0.7, -0.19]),  # [rad], [rad], [m]
-        goal=arm.configuration([0.2, 0.7, -0.19]),  # [rad], [rad], [m]
-        control=densarm.ControlParameters(margin=0.005),  # [m]
-    )
-    run = densarm.simulate(scenario)
+    floor = densarm.HalfSpace(name="floor")
+    wall = densarm.Box(name="wall", size=[0.3, 0.02, 0.2], position=[0.45, 0.0, 0.1])  # [m]
+    world = densarm.World(arm, densarm.Scene([floor, wall]))
+    start = arm.configuration([-0.9, 0.7, -0.19])  # [rad], [rad], [m]
+    goal = arm.configuration([0.2, 0.7, -0.19])  # [rad], [rad], [m]
+
+    motion = densarm.plan_motion(world, start, goal, margin=0.005)  # [m]
+    run = densarm.simulate(world, densarm.DensityTracking(world, motion), start)
     print(f"{run.outcome} after {run.time[-1]:.2f} s, certified: {run.certified}")
     print(f"the quill rose to {run.q[:, 2].max() * 1e3:.0f} mm")
     densarm.save_picture(run, out / "own_urdf.png")

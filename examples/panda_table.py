@@ -1,4 +1,4 @@
-"""Carry Panda's hand over a wall on a table: arm, scene and scenario from Python.
+"""Carry Panda's hand over a wall on a table: world, plan, control and run, step by step.
 
 python examples/panda_table.py --out .
 """
@@ -30,16 +30,15 @@ def main(out: Path) -> None:
             ),
         ]
     )
-    scenario = densarm.Scenario(
-        name="over_the_wall",
-        title="Carry Panda's hand over a wall on a table",
-        arm=arm,
-        scene=scene,
-        start=arm.configuration([0.5, 0.3, 0.0, -2.0, 0.0, 2.3, 0.8]),  # [rad]
-        goal=arm.configuration([-0.5, 0.3, 0.0, -2.0, 0.0, 2.3, 0.8]),  # [rad]
-        control=densarm.ControlParameters(margin=0.005),  # [m]
-    )
-    run = densarm.simulate(scenario)
+    world = densarm.World(arm, scene)
+    start = arm.configuration([0.5, 0.3, 0.0, -2.0, 0.0, 2.3, 0.8])  # [rad]
+    goal = arm.configuration([-0.5, 0.3, 0.0, -2.0, 0.0, 2.3, 0.8])  # [rad]
+
+    motion = densarm.plan_motion(world, start, goal, margin=0.005)  # [m]
+    controller = densarm.DensityTracking(world, motion)
+    run = densarm.simulate(world, controller, start, title="Carry Panda's hand over a wall")
+
+    print(f"{motion.duration:.2f} s, planned in {motion.plan_time * 1e3:.0f} ms")
     print(run.outcome.description, run.detail)
     print(f"certified: {run.certified}, clearance at least {run.clearance.min() * 1e3:.1f} mm")
     densarm.save_html(run, out / "panda_table.html")

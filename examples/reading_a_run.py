@@ -13,17 +13,17 @@ import densarm
 
 
 def main(file: Path, out: Path) -> None:
-    run = densarm.Trajectory.load(file)
-    arm, scene = run.scenario.arm, run.scenario.scene
-    print(f"{run.scenario.title}: {run.outcome} after {run.time[-1]:.2f} s")
+    run = densarm.Run.load(file)
+    arm, scene = run.task.arm, run.task.scene
+    print(f"{run.task.title}: {run.outcome} after {run.time[-1]:.2f} s")
 
-    for check in run.verify().checks:  # computed anew from what the file holds
+    for check in run.certificate.checks:  # computed anew from what the file holds
         print(f"  {check.name:<10}{'proved' if check.holds else 'not proved'}: {check.detail}")
 
-    clearance = densarm.Clearance(arm, scene)
+    world = densarm.World(arm, scene)
     print("clearance over time")
     for k in np.linspace(0, len(run.time) - 1, 6).astype(int):
-        sample = clearance.evaluate(run.q[k])
+        sample = world.clearance(run.q[k])
         pair = sample.pairs[sample.distance.argmin()]
         print(f"  {run.time[k]:5.2f} s{run.clearance[k] * 1e3:8.1f} mm  {' and '.join(pair)}")
 

@@ -10,13 +10,12 @@ import densarm
 
 
 def main(out: Path) -> None:
-    scenario = densarm.load_scenario("swing_up")
-    run = densarm.simulate(scenario)
+    run = densarm.run("swing_up")
 
     print(run.outcome.description)
     print(f"after {run.time[-1]:.2f} s, {run.goal_error:.1e} rad from the goal")
     print(f"never closer than {run.clearance.min() * 1e3:.1f} mm to an obstacle")
-    for check in run.verify().checks:
+    for check in run.certificate.checks:
         print(f"{check.name}: {'proved' if check.holds else 'not proved'}, {check.detail}")
 
     run.save(out / "swing_up.npz")

@@ -3,11 +3,15 @@ import shutil
 from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
 import pytest
 from hypothesis import settings
 
 import densarm
+from densarm.scenarios.run import run
+from densarm.scenarios.scenario import Scenario, load_scenario
+from densarm.scene.obstacles import Sphere
+from densarm.scene.scene import Scene
+from densarm.simulation.run import Run
 
 # A process that a test starts imports the densarm under test, whatever its working directory.
 os.environ["PYTHONSAFEPATH"] = "1"
@@ -29,24 +33,26 @@ def chromium() -> str:
 
 
 @pytest.fixture(scope="session")
-def swing_up_run() -> "densarm.Trajectory":
-    """A certified run of swing_up."""
-    return densarm.simulate(densarm.load_scenario("swing_up"))
+def swing_up() -> Scenario:
+    """The two-link arm swings up between two balls."""
+    return load_scenario("swing_up")
 
 
 @pytest.fixture(scope="session")
-def fenced_in() -> "densarm.Scenario":
-    """A swing-up inside a ring of balls, to a goal that a short search finds no path to."""
-    swing_up = densarm.load_scenario("swing_up")
-    ring = [
-        densarm.Sphere(
-            name=f"ball{k}", radius=0.2, position=[2.1 * np.sin(a), 0.0, -2.1 * np.cos(a)]
-        )
-        for k, a in enumerate(np.linspace(0.3, 2 * np.pi - 0.3, 40))
+def swing_up_run(swing_up: Scenario) -> Run:
+    """A certified run of swing_up."""
+    return run(swing_up)
+
+
+@pytest.fixture(scope="session")
+def fenced_in(swing_up: Scenario) -> Scenario:
+    """A swing-up that two balls beside the upper link make impossible, and a short search."""
+    beside = [
+        Sphere(name=name, radius=0.2, position=(x, 0.0, -0.5))
+        for name, x in (("left", -0.5), ("right", 0.5))
     ]
     return replace(
         swing_up,
-        scene=densarm.Scene(ring),
-        goal=swing_up.arm.configuration((1.0, 0.5)),
+        scene=Scene(beside),
         planning=replace(swing_up.planning, iterations=50, searches=1),
     )

@@ -7,8 +7,8 @@ from cbfpy import CBF, CBFConfig
 
 from control_steps.jax_arm import JaxArm
 from control_steps.task import MARGIN, ControlTask
-from densarm.arrays import Array
-from densarm.control.gains import Gains
+from densarm.control.controller import Gains
+from densarm.values.arrays import Array
 
 _RATE = 10.0  # of both class-K functions, as in the examples of OSCBF [1/s]
 _TOLERANCE = {"elastiqp": 1e-6, "qpax": 1e-3}  # as cbfpy's examples and defaults have them
@@ -37,8 +37,8 @@ class CbfpyStep:
             return config.distances(q), jax.jacfwd(config.distances)(q)
 
         self._command, self._measure = jax.jit(command), jax.jit(measure)
-        reference = task.reference
-        self._wanted = np.stack([reference.position, reference.velocity, task.acceleration], axis=1)
+        motion = task.motion
+        self._wanted = np.stack([motion.position, motion.velocity, task.acceleration], axis=1)
         self.name = f"cbfpy, {backend}"
         self.set_up = (
             "computed torque, then CBF.safety_filter: every pair and joint limit a barrier of"

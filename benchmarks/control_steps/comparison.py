@@ -10,7 +10,7 @@ from timing.turns import blocks_of, ratios, time_in_turns
 from control_steps.control_step import ControlStep
 from control_steps.densarm_step import DensarmStep
 from control_steps.task import ControlTask, panda_task
-from densarm.arrays import Array
+from densarm.values.arrays import Array
 
 PACKAGES = {"pin-pink": "pink", "mink": "mink", "cbfpy": "cbfpy"}
 """The module of each peer by the name of its package."""
@@ -30,7 +30,7 @@ def control_steps(task: ControlTask, peers: list[str]) -> list[ControlStep]:
     if "pin-pink" in peers:
         from control_steps.pink_step import PinkStep
 
-        steps += [PinkStep(task, rows) for rows in (_CLOSEST, task.clearance.n_pairs)]
+        steps += [PinkStep(task, rows) for rows in (_CLOSEST, task.world.n_pairs)]
     if "cbfpy" in peers:
         from control_steps.cbfpy_step import CbfpyStep
 
@@ -71,7 +71,7 @@ def compare(
         "shapes": shapes,
         "scene": scene,
         "spheres": n_spheres,
-        "pairs": task.clearance.n_pairs,
+        "pairs": task.world.n_pairs,
         "pairs_within": {f"{r:g} m": float(np.mean(np.sum(exact < r, axis=1))) for r in _NEAR},
         "states": sum(len(block) for block in visited) * rounds,
         "steps": [

@@ -2,7 +2,7 @@
 
 from typing import Protocol
 
-from densarm.arrays import Array
+from densarm.values.arrays import Array
 
 
 class ControlStep(Protocol):

@@ -8,7 +8,7 @@ import numpy as np
 import pinocchio as pin
 from jax import Array
 
-from densarm.arm import Arm
+from densarm.arms.arm import Arm
 
 
 class JaxArm:

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from control_steps.mujoco_model import SITE, mujoco_model
 from control_steps.task import MARGIN, ControlTask
-from densarm.arrays import Array
+from densarm.values.arrays import Array
 
 _GAIN = 0.85  # of mink's collision limit, its default
 
@@ -61,7 +61,7 @@ class MinkStep:
         self._configuration.update(self._task.q[k])
         self._frame.set_target(self._poses[k])
         self._posture.set_target(self._task.wanted[k])
-        return mink.solve_ik(
+        velocity: Array = mink.solve_ik(
             self._configuration,
             [self._frame, self._posture],
             self._task.period,
@@ -69,18 +69,19 @@ class MinkStep:
             damping=1e-3,
             limits=self._limits,
         )
+        return velocity
 
     def distances(self, k: int) -> Array:
         self._configuration.update(self._task.q[k])
         period = self._task.period
         bound = self._collision.compute_qp_inequalities(self._configuration, period).h
-        distance = np.full(self._task.clearance.n_pairs, np.nan)
+        distance = np.full(self._task.world.n_pairs, np.nan)
         seen = np.isfinite(bound)
         distance[self._order[seen]] = MARGIN + bound[seen] * period / _GAIN
         return distance
 
     def _order_of_pairs(self, model: mujoco.MjModel) -> NDArray[np.int64]:
-        place = {frozenset(pair): k for k, pair in enumerate(self._task.clearance.pairs)}
+        place = {frozenset(pair): k for k, pair in enumerate(self._task.world.pairs)}
         return np.array(
             [
                 place[frozenset((model.geom(a).name, model.geom(b).name))]

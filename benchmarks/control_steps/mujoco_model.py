@@ -51,7 +51,7 @@ def _add_link(parent: mujoco.MjsBody, model: pin.Model, joint: int) -> mujoco.Mj
 
 def _axis(model: pin.Model, joint: int) -> list[float]:
     motion = np.ravel(model.joints[joint].createData().S)
-    return motion[3:].tolist()
+    return [float(x) for x in motion[3:]]
 
 
 def _add_shape(spec: mujoco.MjSpec, body: mujoco.MjsBody, item: pin.GeometryObject) -> None:

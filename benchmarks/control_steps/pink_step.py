@@ -7,7 +7,7 @@ from pink.barriers import SelfCollisionBarrier
 from pink.tasks import FrameTask, PostureTask
 
 from control_steps.task import MARGIN, ControlTask
-from densarm.arrays import Array
+from densarm.values.arrays import Array
 
 
 class PinkStep:
@@ -20,7 +20,7 @@ class PinkStep:
 
     def __init__(self, task: ControlTask, rows: int) -> None:
         self._task, self._poses = task, task.poses()
-        model, geometry = task.arm.model.copy(), task.clearance.geometry_model.copy()
+        model, geometry = task.arm.model.copy(), task.world.geometry_model.copy()
         self._configuration = pink.Configuration(
             model,
             model.createData(),
@@ -33,7 +33,7 @@ class PinkStep:
         )
         self._frame = FrameTask(task.arm.end_effector, position_cost=50.0, orientation_cost=10.0)
         self._posture = PostureTask(cost=1e-3)
-        kind = "all" if rows == task.clearance.n_pairs else f"closest {rows}"
+        kind = "all" if rows == task.world.n_pairs else f"closest {rows}"
         self.name = f"pin-pink, {kind} rows"
         self.set_up = (
             f"solve_ik with FrameTask, PostureTask, SelfCollisionBarrier ({rows} rows, gain 20, as"
@@ -50,7 +50,7 @@ class PinkStep:
         self._configuration.update(self._task.q[k])
         self._frame.set_target(self._poses[k])
         self._posture.set_target(self._task.wanted[k])
-        return pink.solve_ik(
+        velocity: Array = pink.solve_ik(
             self._configuration,
             [self._frame, self._posture],
             self._task.period,
@@ -58,8 +58,9 @@ class PinkStep:
             barriers=[self._barrier],
             safety_break=False,
         )
+        return velocity
 
     def distances(self, k: int) -> Array:
         self._configuration.update(self._task.q[k])
         results = self._configuration.collision_data.distanceResults
-        return np.array([result.min_distance for result in results])
+        return np.array([result.min_distance for result in results], np.float64)

@@ -6,14 +6,15 @@ from functools import cached_property
 import numpy as np
 import pinocchio as pin
 
-from densarm.arm import Arm, load_arm
-from densarm.arrays import Array
-from densarm.bench.swing_among_spheres import clearance_among_spheres, swing
-from densarm.clearance import Clearance
-from densarm.reference.reference import Reference
-from densarm.scene import Scene, Sphere
+from densarm.arms.arm import Arm, load_arm
+from densarm.planning.motion import Motion
+from densarm.scene.obstacles import Sphere
+from densarm.scene.scene import Scene
+from densarm.study.step import swing, world_among_spheres
+from densarm.values.arrays import Array
+from densarm.world.world import World
 
-OFF_REFERENCE = 1e-3  # of the states in every joint [rad]
+OFF_MOTION = 1e-3  # of the states in every joint [rad]
 MARGIN = 0.005  # distance that the peers keep [m]
 _ENDS = 100  # states
 _REACH, _HEIGHT = 0.6, 1.0  # half the side and height of the box of scattered spheres [m]
@@ -29,22 +30,22 @@ class ControlTask:
     """
 
     arm: Arm
-    clearance: Clearance
-    reference: Reference
+    world: World
+    motion: Motion
 
     @property
     def spheres(self) -> list[Sphere]:
-        return list(self.clearance.scene)
+        return [body for body in self.world.scene if isinstance(body, Sphere)]
 
     @property
     def period(self) -> float:
         """Time between states [s]."""
-        return self.reference.period
+        return self.motion.period
 
     @cached_property
     def q(self) -> Array:
         """Configurations (N, 7) [rad]."""
-        return self.reference.position + OFF_REFERENCE
+        return self.motion.position + OFF_MOTION
 
     @property
     def visited(self) -> range:
@@ -54,19 +55,19 @@ class ControlTask:
     @property
     def v(self) -> Array:
         """Velocities (N, 7) [rad/s]."""
-        return self.reference.velocity
+        return self.motion.velocity
 
     @cached_property
     def wanted(self) -> Array:
         """Positions one period after each state (N, 7) [rad]: what a velocity is commanded for."""
-        position = self.reference.position
+        position = self.motion.position
         return np.vstack([position[1:], position[-1:]])
 
     @cached_property
     def acceleration(self) -> Array:
-        """Accelerations of the reference at each state (N, 7) [rad/s²]."""
+        """Accelerations of the motion at each state (N, 7) [rad/s²]."""
         times = self.period * np.arange(len(self.q))
-        return np.array([self.reference.sample(t).acceleration for t in times])
+        return np.array([self.motion.sample(t).acceleration for t in times])
 
     def poses(self) -> list[pin.SE3]:
         """Return the end effector's poses at `wanted`."""
@@ -89,23 +90,23 @@ def panda_task(shapes: str, n_spheres: int, scene: str) -> ControlTask:
             closest; or "scattered", anywhere in reach where the arm does not come.
     """
     arm = load_arm("panda", shapes=shapes)
-    reference = swing(arm)
+    motion = swing(arm)
     if scene == "scattered":
-        return ControlTask(arm, _among_scattered(arm, reference, n_spheres), reference)
+        return ControlTask(arm, _among_scattered(arm, motion, n_spheres), motion)
     moving = sum(item.parentJoint > 0 for item in arm.collision_model.geometryObjects)
-    return ControlTask(arm, clearance_among_spheres(arm, reference, n_spheres * moving), reference)
+    return ControlTask(arm, world_among_spheres(arm, motion, n_spheres * moving), motion)
 
 
-def _among_scattered(arm: Arm, reference: Reference, count: int) -> Clearance:
+def _among_scattered(arm: Arm, motion: Motion, count: int) -> World:
     arm.collision_model.removeAllCollisionPairs()
     random = np.random.default_rng(0)
     lowest, highest = (-_REACH, -_REACH, 0.0), (_REACH, _REACH, _HEIGHT)
-    passed = arm.configurations(reference.position[:: len(reference.position) // 10])
+    passed = arm.configurations(motion.position[:: len(motion.position) // 10])
     spheres: list[Sphere] = []
     while len(spheres) < count:
         position = tuple(random.uniform(lowest, highest).tolist())
         sphere = Sphere(name=f"sphere_{len(spheres)}", radius=_RADIUS, position=position)
-        alone = Clearance(arm, Scene([sphere]))
+        alone = World(arm, Scene([sphere]))
         if min(alone.distances(q).min() for q in passed) >= _NEAREST:
             spheres.append(sphere)
-    return Clearance(arm, Scene(spheres))
+    return World(arm, Scene(spheres))

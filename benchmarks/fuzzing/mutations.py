@@ -4,6 +4,9 @@ import io
 import json
 import xml.etree.ElementTree as ElementTree
 import zipfile
+from collections.abc import Callable
+from random import Random
+from typing import Any
 
 import numpy as np
 from hypothesis import strategies as st
@@ -22,8 +25,11 @@ VALUES = st.recursive(
 )
 DEPTHS = (10, 900, 20_000)
 
+Draw = Callable[[Any], Any]
+"""Hypothesis' draw from a strategy."""
 
-def mutated_bytes(content: bytes, random) -> bytes:
+
+def mutated_bytes(content: bytes, random: Random) -> bytes:
     """Cut, copy, exchange and overwrite pieces of a file."""
     data = bytearray(content)
     for _ in range(random.choice((1, 1, 2, 5))):
@@ -36,7 +42,7 @@ def mutated_bytes(content: bytes, random) -> bytes:
     return bytes(data)
 
 
-def mutated_text(content: bytes, random) -> bytes:
+def mutated_text(content: bytes, random: Random) -> bytes:
     """Replace words of a text file, or exchange its lines."""
     lines = content.decode("utf-8", "replace").split("\n")
     for _ in range(random.choice((1, 1, 2, 5))):
@@ -53,7 +59,7 @@ def mutated_text(content: bytes, random) -> bytes:
     return "\n".join(lines).encode("utf-8", "surrogatepass")
 
 
-def mutated_value(value, random, draw):
+def mutated_value(value: Any, random: Random, draw: Draw) -> Any:
     """Return nested data with one of its entries replaced, left out or wrapped."""
     if not isinstance(value, dict | list) or not value or random.random() < 0.15:
         return f"<{random.choice(DEPTHS)} deep>" if random.random() < 0.05 else draw(VALUES)
@@ -76,18 +82,18 @@ def deepened(text: str) -> str:
     return text
 
 
-def dumped(value) -> str:
+def dumped(value: Any) -> str:
     """Return JSON."""
     return deepened(json.dumps(value))
 
 
-def toml(table: dict) -> str:
+def toml(table: dict[Any, Any]) -> str:
     """Return TOML, each entry of the file inline."""
     lines = (f"{json.dumps(str(key))} = {_toml_value(v)}" for key, v in table.items())
     return deepened("\n".join(lines))
 
 
-def _toml_value(value) -> str:
+def _toml_value(value: Any) -> str:
     if isinstance(value, dict):
         pairs = (f"{json.dumps(str(key))} = {_toml_value(item)}" for key, item in value.items())
         return f"{{{', '.join(pairs)}}}"
@@ -98,7 +104,7 @@ def _toml_value(value) -> str:
     return json.dumps(value)
 
 
-def mutated_xml(content: bytes, random) -> bytes:
+def mutated_xml(content: bytes, random: Random) -> bytes:
     """Move, copy, drop and rename elements, and change their attributes."""
     root = ElementTree.fromstring(content)
     for _ in range(random.choice((1, 1, 2, 4))):
@@ -114,7 +120,7 @@ def mutated_xml(content: bytes, random) -> bytes:
             element.tag = random.choice(elements).tag
         elif element.attrib:
             key = random.choice(sorted(element.attrib))
-            same = [e.get(key) for e in elements if key in e.attrib]
+            same = [e.get(key, "") for e in elements if key in e.attrib]
             value = random.choice((random.choice(WORDS), random.choice(same), ""))
             element.set(key, value.replace("\0", ""))
     text = ElementTree.tostring(root)
@@ -124,7 +130,7 @@ def mutated_xml(content: bytes, random) -> bytes:
     return text
 
 
-def mutated_npz(content: bytes, random, draw) -> bytes:
+def mutated_npz(content: bytes, random: Random, draw: Draw) -> bytes:
     """Change arrays, their kinds and shapes, headers, or the scenario of a run's file."""
     with np.load(io.BytesIO(content), allow_pickle=False) as data:
         arrays = {name: data[name] for name in data}
@@ -151,7 +157,7 @@ def mutated_npz(content: bytes, random, draw) -> bytes:
     return file.getvalue()
 
 
-def enlarged_header(content: bytes, random) -> bytes:
+def enlarged_header(content: bytes, random: Random) -> bytes:
     """Let an array's header claim more entries than the file has."""
     out = io.BytesIO()
     with zipfile.ZipFile(io.BytesIO(content)) as old, zipfile.ZipFile(out, "w") as new:

@@ -6,14 +6,16 @@ import tomllib
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
+from random import Random
 from typing import Any
 
 import yaml
 
 import densarm
-from densarm.catalogue import robots_folder, scenario_paths
-from densarm.scene_files import load_problems, load_scene
+from densarm import Arm
+from densarm.arms.catalogue import robots_folder, scenario_paths
 from fuzzing import mutations
+from fuzzing.mutations import Draw
 
 DATA = Path(__file__).parents[2] / "tests" / "data"
 
@@ -94,6 +96,9 @@ PROBLEMS = {
 }
 
 
+Mutation = Callable[[bytes, Random, Draw], bytes]
+
+
 @dataclass(frozen=True)
 class Target:
     """A parser and the files that it is given."""
@@ -101,31 +106,31 @@ class Target:
     suffix: str
     parse: Callable[[Path], Any]
     seeds: tuple[bytes, ...]
-    mutate: Callable[[bytes, Any, Any], bytes]
+    mutate: Mutation
     """From a seed, a source of random choices and hypothesis' draw to a file."""
 
 
-def _text(content, random, _):
+def _text(content: bytes, random: Random, _: Draw) -> bytes:
     return mutations.mutated_text(content, random)
 
 
-def _structured(load, dump):
-    def mutate(content, random, draw):
+def _structured(load: Callable[[str], Any], dump: Callable[[Any], str]) -> Mutation:
+    def mutate(content: bytes, random: Random, draw: Draw) -> bytes:
         value = mutations.mutated_value(load(content.decode()), random, draw)
         return dump(value).encode("utf-8", "surrogatepass")
 
     return mutate
 
 
-def _toml(value):
+def _toml(value: Any) -> str:
     return mutations.toml(value) if isinstance(value, dict) else mutations.dumped(value)
 
 
-def _xml(content, random, _):
+def _xml(content: bytes, random: Random, _: Draw) -> bytes:
     return mutations.mutated_xml(content, random)
 
 
-def _with_srdf(path):
+def _with_srdf(path: Path) -> Arm:
     return densarm.load_arm(DATA / "branching.urdf", srdf=path)
 
 
@@ -134,7 +139,7 @@ def _run_file(folder: Path) -> bytes:
     arm = scenario.arm
     short = replace(scenario, start=arm.configuration((0.02, 0.0)), goal=arm.postures["hanging"])
     path = folder / "seed.npz"
-    densarm.simulate(replace(short, scene=densarm.Scene([]))).save(path)
+    densarm.run(replace(short, scene=densarm.Scene([]))).save(path)
     content = path.read_bytes()
     path.unlink()
     return content
@@ -151,16 +156,16 @@ def targets(folder: Path) -> dict[str, Target]:
         "scenario": Target(
             ".toml", densarm.load_scenario, scenarios, _structured(tomllib.loads, _toml)
         ),
-        "run": Target(".npz", densarm.Trajectory.load, (_run_file(folder),), mutations.mutated_npz),
+        "run": Target(".npz", densarm.Run.load, (_run_file(folder),), mutations.mutated_npz),
         "problems": Target(
-            ".json", load_problems, (problems,), _structured(json.loads, mutations.dumped)
+            ".json", densarm.load_problems, (problems,), _structured(json.loads, mutations.dumped)
         ),
         "urdf": Target(".urdf", densarm.load_arm, (robot, tree), _xml),
         "srdf": Target(".srdf", _with_srdf, ((DATA / "branching.srdf").read_bytes(),), _xml),
-        "scene": Target(".scene", load_scene, (SCENE.encode(),), _text),
+        "scene": Target(".scene", densarm.load_scene, (SCENE.encode(),), _text),
         "yaml": Target(
             ".yaml",
-            load_scene,
+            densarm.load_scene,
             (PLANNING_SCENE.encode(),),
             _structured(yaml.safe_load, mutations.dumped),
         ),

@@ -5,8 +5,10 @@ import os
 import resource
 import sys
 import tempfile
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 _WRITING = os.O_WRONLY | os.O_RDWR | os.O_CREAT | os.O_TRUNC | os.O_APPEND
 _FORBIDDEN = ("pickle.find_class", "subprocess.Popen", "os.system", "socket.connect", "os.exec")
@@ -37,7 +39,7 @@ class Watch:
         sys.addaudithook(self._audit)
 
     @contextmanager
-    def watching(self):
+    def watching(self) -> Iterator[None]:
         """Watch over the block, during which the process prints into a file."""
         before = self._content()
         self.notes.clear()
@@ -65,12 +67,14 @@ class Watch:
     def _content(self) -> set[str]:
         return {str(path) for path in self._folder.rglob("*")}
 
-    def _audit(self, event: str, arguments) -> None:
+    def _audit(self, event: str, arguments: tuple[Any, ...]) -> None:
         if not self._watching:
             return
         if event.startswith(_FORBIDDEN):
             self.notes.append(event)
         if event == "open" and isinstance(arguments[2], int) and arguments[2] & _WRITING:
+            if isinstance(arguments[0], int):
+                return  # no file, but what is open already
             path = str(arguments[0])
             # What C++ prints is caught in a temporary file that vanishes by itself.
             if not path.startswith(tempfile.gettempdir()):

@@ -6,21 +6,22 @@ from ompl import base as ob
 from ompl import geometric as og
 from ompl import util as ou
 
-from densarm.arrays import Array
-from densarm.clearance import Clearance
-from densarm.scenario import Scenario
+from densarm.scenarios.scenario import Scenario
+from densarm.values.arrays import Array
+from densarm.world.world import World
 
 RESOLUTION = 0.01  # OMPL's default: of the extent of the joint space, between checked states
 _TIME = 30.0  # for the search [s]
 _STEP = 0.1  # between waypoints at most [rad]
 
 
-def search(scenario: Scenario, clearance: Clearance) -> Array | None:
+def search(scenario: Scenario) -> Array | None:
     """Return waypoints (W, nq), simplified and then made dense, or None if none were found.
+
+    What touches is asked of coal's collision tests alone.
 
     Args:
         scenario: of an arm without continuous joints.
-        clearance: of its arm and scene; what touches is asked of coal's collision tests alone.
     """
     ou.setLogLevel(ou.LogLevel.LOG_NONE)
     space = ob.RealVectorStateSpace(0)
@@ -29,7 +30,7 @@ def search(scenario: Scenario, clearance: Clearance) -> Array | None:
         space.addDimension(*side)
     space.setup()  # without which copying into a state ends the process
     setup = og.SimpleSetup(space)
-    setup.setStateValidityChecker(_Free(clearance))
+    setup.setStateValidityChecker(_Free(scenario.world))
     information = setup.getSpaceInformation()
     information.setStateValidityCheckingResolution(RESOLUTION)
     setup.setStartAndGoalStates(_state(space, scenario.start), _state(space, scenario.goal))
@@ -43,8 +44,8 @@ def search(scenario: Scenario, clearance: Clearance) -> Array | None:
 class _Free:
     """Whether no pair touches, by the first one found that does."""
 
-    def __init__(self, clearance: Clearance) -> None:
-        self._model, self._geometry = clearance.arm.model, clearance.geometry_model
+    def __init__(self, world: World) -> None:
+        self._model, self._geometry = world.arm.model, world.geometry_model
         self._data, self._results = self._model.createData(), self._geometry.createData()
 
     def __call__(self, state: ob.State) -> bool:

@@ -32,7 +32,7 @@ KINDS = {
     "obstacle moved": Kind("swept", obstruction.obstacle_moved),
     "obstacle enlarged": Kind("swept", obstruction.obstacle_enlarged),
     "obstacle between samples": Kind("swept", obstruction.obstacle_between_samples),
-    "brake blocked": Kind("stopping", obstruction.blocked_brake),
+    "stop blocked": Kind("stopping", obstruction.blocked_stop),
     "entry not finite": Kind("file", file.not_finite),
     "row missing": Kind("file", file.missing_row),
     "mesh changed": Kind("file", file.other_mesh),

@@ -1,16 +1,18 @@
 """Ways to tamper with the file of a run."""
 
 import json
+from collections.abc import Callable
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import Any
 
 import numpy as np
 
-from densarm import Trajectory
+from densarm import Run
 from tampering.kind import ROWS, NotPossibleError
 
 
-def reloaded(run, change):
+def reloaded(run: Run, change: Callable[[dict[str, Any]], None]) -> Run:
     """Return the run from a file whose arrays were changed."""
     with TemporaryDirectory() as folder:
         path = Path(folder) / "run.npz"
@@ -19,27 +21,27 @@ def reloaded(run, change):
             arrays = {name: data[name] for name in data}
         change(arrays)
         np.savez(path, **arrays)
-        return Trajectory.load(path)
+        return Run.load(path)
 
 
-def not_finite(run, rng):
-    def change(arrays):
+def not_finite(run: Run, rng: np.random.Generator) -> Run:
+    def change(arrays: dict[str, Any]) -> None:
         array = arrays[rng.choice(ROWS[:4])]
         array.flat[rng.integers(array.size)] = rng.choice([np.nan, np.inf, -np.inf])
 
     return reloaded(run, change)
 
 
-def missing_row(run, rng):
-    def change(arrays):
+def missing_row(run: Run, rng: np.random.Generator) -> Run:
+    def change(arrays: dict[str, Any]) -> None:
         name = rng.choice(ROWS)
         arrays[name] = np.delete(arrays[name], rng.integers(len(arrays[name])), axis=0)
 
     return reloaded(run, change)
 
 
-def other_mesh(run, rng):
-    def change(arrays):
+def other_mesh(run: Run, rng: np.random.Generator) -> Run:
+    def change(arrays: dict[str, Any]) -> None:
         scenario = json.loads(str(arrays["scenario"]))
         if not scenario["mesh_sha256"]:
             raise NotPossibleError

@@ -2,10 +2,12 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from densarm import Trajectory
+from densarm import Run
 
 ROWS = ("time", "q", "v", "tau", "clearance")
 _MOVING = 0.05  # [rad/s], slowest motion that a left-out sample shows in
@@ -21,24 +23,26 @@ class Kind:
 
     part: str
     """The part of the certificate that must fail; "file" where the file must be refused."""
-    tamper: Callable[[Trajectory, np.random.Generator], Trajectory]
+    tamper: Callable[[Run, np.random.Generator], Run]
 
 
-def exponent(rng, low, high):
+def exponent(rng: np.random.Generator, low: float, high: float) -> float:
     """Return a number between 10^low and 10^high, even in its logarithm, of either sign."""
     return float(10.0 ** rng.uniform(low, high) * rng.choice([-1.0, 1.0]))
 
 
-def moving_sample(run, rng):
+def moving_sample(run: Run, rng: np.random.Generator) -> int:
     moving = np.flatnonzero(np.abs(run.v).max(axis=1) > _MOVING)
     return int(rng.choice(moving[(moving > 1) & (moving < len(run.q) - 3)]))
 
 
-def regridded(run, rows):
+def regridded(run: Run, rows: NDArray[np.int64]) -> Run:
     """Return the run of some of its samples as if no other had been."""
     arrays = {name: getattr(run, name)[rows] for name in ROWS[1:]}
-    return replace(run, time=run.scenario.simulation.dt * np.arange(len(rows)), **arrays)
+    return replace(
+        run, time=run.task.simulation.dt * np.arange(len(rows), dtype=np.float64), **arrays
+    )
 
 
-def with_scenario(run, **changes):
-    return replace(run, scenario=replace(run.scenario, **changes))
+def with_task(run: Run, **changes: Any) -> Run:
+    return replace(run, task=replace(run.task, **changes))

@@ -1,9 +1,9 @@
 """Spread: how a measured quantity is distributed."""
 
-from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 
 @dataclass(frozen=True)
@@ -18,7 +18,7 @@ class Spread:
     largest: float
 
     @classmethod
-    def of(cls, sample: Sequence[float], scale: float = 1.0) -> "Spread":
+    def of(cls, sample: ArrayLike, scale: float = 1.0) -> "Spread":
         values = np.asarray(sample) * scale
         at = np.percentile(values, [5.0, 50.0, 95.0, 99.0, 99.9, 100.0])
         return cls(*at.tolist())

@@ -1,21 +1,30 @@
 """Certificate: what is proved about a recorded run."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+import pinocchio as pin
 
-from densarm.arrays import Array
-from densarm.certificates.replay import REPLAY_TOLERANCE, replay_errors
-from densarm.clearance import Clearance
-from densarm.proof.stopping_check import StoppingCheck
-from densarm.proof.straight_brake import StraightBrake
-from densarm.proof.swept_bound import SweptBound
-from densarm.proof.swept_check import SweptCheck, SweptResult, SweptVerdict
-from densarm.scenario import Scenario
-from densarm.simulation.fixed_step_loop import REACHED_POSITION, REACHED_VELOCITY
+from densarm.arms.arm import Arm
+from densarm.certificates.task import (
+    REACHED_POSITION,
+    REACHED_VELOCITY,
+    Input,
+    Integrator,
+    Task,
+)
+from densarm.values.arrays import Array
+from densarm.values.documented import documented
+from densarm.world.stopping import StoppingCheck, StoppingTrajectory
+from densarm.world.swept_check import SweptCheck, SweptResult, SweptVerdict
+from densarm.world.world import World
+
+REPLAY_TOLERANCE = 1e-9
+"""Largest difference of a replayed state from the recorded one [rad, rad/s or m, m/s]."""
 
 _ROUNDING = 1e-9  # [rad, rad/s, N·m], room for rounding in comparisons with limits
-_RESTS = 20  # ends of brakes at most whose distances are told
+_RESTS = 20  # ends of stopping trajectories at most whose distances are told
 
 
 @dataclass(frozen=True)
@@ -34,11 +43,13 @@ class Check:
     """Where that was [s]."""
 
 
+@documented
 @dataclass(frozen=True)
 class Certificate:
     """The parts of a certificate; the run is certified when all of them hold."""
 
     checks: tuple[Check, ...]
+    """One for each part."""
 
     @property
     def certified(self) -> bool:
@@ -46,86 +57,117 @@ class Certificate:
         return all(check.holds for check in self.checks)
 
 
-def certify(scenario: Scenario, time: Array, q: Array, v: Array, tau: Array) -> Certificate:
-    """Return what is proved about a run, from its record alone.
+def certify(task: Task, time: Array, q: Array, v: Array, tau: Array) -> Certificate:
+    """Return what is proved about a run, from its record alone, whose arrays are as in `Run`.
 
     The parts: swept check of the whole motion against the scene and the arm itself, start and
     goal, limits of position, velocity, acceleration and torque, one-step replay of the dynamics,
-    and a clear straight brake within the limits from every sample.
-
-    Args:
-        scenario: arm, scene, start, goal and integrator.
-        time: (N,) [s].
-        q: configurations (N, nq).
-        v: velocities (N, nv) [rad/s or m/s].
-        tau: torque held from each sample to the next (N, nv) [N·m or N].
+    and a clear stopping trajectory within the limits from every sample.
     """
-    bound = SweptBound(Clearance(scenario.arm, scenario.scene))
+    world = World(task.arm, task.scene)
     return Certificate(
         (
-            _swept(scenario, bound, q, v),
-            _start(scenario, q, v, time),
-            _goal(scenario, q, v),
-            _limits(scenario, q, v, tau),
-            _replay(scenario, q, v, tau),
-            _stopping(scenario, bound, q, v),
+            _swept(task, world, q, v),
+            _start(task, q, v, time),
+            _goal(task, q, v),
+            _limits(task, q, v, tau),
+            _replay(task, q, v, tau),
+            _stopping(task, world, q, v),
         )
     )
 
 
-def swept_result(bound: SweptBound, q: Array, v: Array, dt: float) -> SweptResult:
-    """Return the swept check of a recorded motion.
+def swept_result(world: World, q: Array, v: Array, dt: float) -> SweptResult:
+    """Return the swept check of a motion recorded each dt [s], q (N, nq) and v (N, nv).
 
     Between samples the true motion departs from the chord by at most a Δt²/8, a the largest
     acceleration of the step and its neighbours.
-
-    Args:
-        bound: the pairs and the margin.
-        q: configurations (N, nq).
-        v: velocities (N, nv) [rad/s or m/s].
-        dt: time between samples [s].
     """
     acceleration = np.abs(np.diff(v, axis=0)) / dt
-    around = np.maximum(
-        acceleration,
-        np.maximum(
-            np.vstack([acceleration[:1], acceleration[:-1]]),
-            np.vstack([acceleration[1:], acceleration[-1:]]),
-        ),
-    )
-    return SweptCheck(bound).check(q, around * dt**2 / 8.0)
+    k = np.arange(len(acceleration))
+    around = np.max([acceleration[np.clip(k + by, 0, len(k) - 1)] for by in (-1, 0, 1)], axis=0)
+    return SweptCheck(world).check(q, around * dt**2 / 8.0)
 
 
-def _swept(scenario: Scenario, bound: SweptBound, q: Array, v: Array) -> Check:
-    result = swept_result(bound, q, v, scenario.simulation.dt)
-    at = result.index * scenario.simulation.dt
+def replay_errors(task: Task, q: Array, v: Array, tau: Array) -> Array:
+    """Return how far each recorded state is off the step that leads to it (N - 1,).
+
+    The largest difference [rad, rad/s or m, m/s] counts. Where the plant was told velocities, the
+    step is that of the velocity it then had.
+    """
+    arm, dt, angles = task.arm, task.simulation.dt, task.arm.angles(q[:-1])
+    acceleration = _acceleration(arm, tau[:-1])
+    if task.input == Input.TORQUE and task.simulation.integrator == Integrator.RK4:
+        position, velocity = _rk4(acceleration, dt, angles, v[:-1])
+    else:
+        is_told = task.input == Input.VELOCITY
+        velocity = v[1:] if is_told else v[:-1] + dt * acceleration(angles, v[:-1])
+        position = angles + dt * velocity
+    position = arm.difference(arm.configurations(position), q[1:])
+    largest = np.maximum(np.abs(position), np.abs(velocity - v[1:]))
+    return np.asarray(largest.max(axis=1))
+
+
+_Acceleration = Callable[[Array, Array], Array]
+
+
+def _acceleration(arm: Arm, tau: Array) -> _Acceleration:
+    """Return the acceleration under torques (N, nv), of joint positions and velocities (N, nv)."""
+    pool, columns = pin.ModelPool(arm.model, 1), np.asfortranarray(tau.T)
+
+    def at(angles: Array, v: Array) -> Array:
+        q = np.asfortranarray(arm.configurations(angles).T)
+        found = pin.abaInParallel(1, pool, q, np.asfortranarray(v.T), columns)
+        # Pinocchio drops the axis of a single joint, and of a single state.
+        return np.asarray(found).T.reshape(v.shape)
+
+    return at
+
+
+def _rk4(acceleration: _Acceleration, dt: float, angles: Array, v: Array) -> tuple[Array, Array]:
+    a1 = acceleration(angles, v)
+    v2 = v + 0.5 * dt * a1
+    a2 = acceleration(angles + 0.5 * dt * v, v2)
+    v3 = v + 0.5 * dt * a2
+    a3 = acceleration(angles + 0.5 * dt * v2, v3)
+    v4 = v + dt * a3
+    a4 = acceleration(angles + dt * v3, v4)
+    mean_v, mean_a = v + 2.0 * v2 + 2.0 * v3 + v4, a1 + 2.0 * a2 + 2.0 * a3 + a4
+    return angles + dt / 6.0 * mean_v, v + dt / 6.0 * mean_a
+
+
+def _swept(task: Task, world: World, q: Array, v: Array) -> Check:
+    result = swept_result(world, q, v, task.simulation.dt)
+    at = result.index * task.simulation.dt
     if result.verdict != SweptVerdict.CLEAR:
         pairs = ", ".join(f"{a}-{b}" for a, b in result.pairs[:3])
         return Check("swept", False, f"{result.verdict} at t = {at:.3f} s: {pairs}", None, at)
-    found = f"{_nearest(result.distance, at)} of {result.evaluations} configurations"
+    found = f"{_nearest(result.distance, at)} of {len(result.evaluated)} configurations"
     return Check("swept", True, f"proved clear, {found}", _finite(result.distance), at)
 
 
-def _start(scenario: Scenario, q: Array, v: Array, time: Array) -> Check:
-    error = float(np.abs(scenario.arm.difference(scenario.start, q[0])).max())
+def _start(task: Task, q: Array, v: Array, time: Array) -> Check:
+    error = float(np.abs(task.arm.difference(task.start, q[0])).max())
     speed = float(np.abs(v[0]).max())
-    shift = float(np.abs(time - scenario.simulation.dt * np.arange(len(time))).max())
+    shift = float(np.abs(time - task.simulation.dt * np.arange(len(time))).max())
     holds = error <= _ROUNDING and speed == 0.0 and shift <= _ROUNDING
     detail = f"{error:.2g} from the start at {speed:.2g} rad/s, {shift:.2g} s off the time grid"
     return Check("start", holds, detail, _finite(_ROUNDING - max(error, speed, shift)), 0.0)
 
 
-def _goal(scenario: Scenario, q: Array, v: Array) -> Check:
-    error = float(np.abs(scenario.arm.difference(scenario.goal, q[-1])).max())
-    speed = float(np.abs(v[-1]).max())
+def _goal(task: Task, q: Array, v: Array) -> Check:
+    end = (len(q) - 1) * task.simulation.dt
+    if task.goal is None:
+        return Check("goal", False, "no goal was given", None, end)
+    error, speed = task.goal_error(q[-1]), float(np.abs(v[-1]).max())
     holds = error <= REACHED_POSITION and speed <= REACHED_VELOCITY
     margin = min(REACHED_POSITION - error, REACHED_VELOCITY - speed)
     detail = f"ends {error:.2g} from the goal at {speed:.2g} rad/s"
-    return Check("goal", holds, detail, _finite(margin), (len(q) - 1) * scenario.simulation.dt)
+    return Check("goal", holds, detail, _finite(margin), end)
 
 
-def _limits(scenario: Scenario, q: Array, v: Array, tau: Array) -> Check:
-    arm, dt = scenario.arm, scenario.simulation.dt
+def _limits(task: Task, q: Array, v: Array, tau: Array) -> Check:
+    arm, dt = task.arm, task.simulation.dt
     limits, angles = arm.limits, arm.angles(q)
     ratios = {
         "velocity": np.abs(v) / limits.velocity,
@@ -154,21 +196,19 @@ def _peak(values: Array) -> tuple[float, int, int]:
     return float(values[row, column]), int(row), int(column)
 
 
-def _replay(scenario: Scenario, q: Array, v: Array, tau: Array) -> Check:
-    simulation = scenario.simulation
-    errors = replay_errors(scenario.arm, simulation.dt, simulation.integrator, q, v, tau)
-    worst = int(np.argmax(errors)) if errors.size else 0
-    error = float(errors[worst]) if errors.size else 0.0
-    at = worst * simulation.dt
+def _replay(task: Task, q: Array, v: Array, tau: Array) -> Check:
+    errors = np.append(replay_errors(task, q, v, tau), 0.0)
+    worst = int(np.argmax(errors))
+    error, at = float(errors[worst]), worst * task.simulation.dt
     detail = f"one-step replay within {error:.1g}"
     if not error <= REPLAY_TOLERANCE:
         detail += f" at t = {at:.3f} s"
     return Check("replay", error <= REPLAY_TOLERANCE, detail, _finite(REPLAY_TOLERANCE - error), at)
 
 
-def _stopping(scenario: Scenario, bound: SweptBound, q: Array, v: Array) -> Check:
-    arm, dt = scenario.arm, scenario.simulation.dt
-    result = StoppingCheck(bound, StraightBrake(arm)).check(q, v)
+def _stopping(task: Task, world: World, q: Array, v: Array) -> Check:
+    arm, dt = task.arm, task.simulation.dt
+    result = StoppingCheck(world, StoppingTrajectory(arm)).check(q, v)
     failing = result.failing
     if failing.size:
         first = int(failing[0])
@@ -177,14 +217,14 @@ def _stopping(scenario: Scenario, bound: SweptBound, q: Array, v: Array) -> Chec
             why = "leaves the position limits"
         if not np.isfinite(result.duration[first]):
             why = "needs more torque than there is"
-        detail = f"the brake from t = {first * dt:.3f} s {why}; {failing.size} of {len(q)} fail"
+        detail = f"stopping from t = {first * dt:.3f} s {why}; {failing.size} of {len(q)} fail"
         return Check("stopping", False, detail, None, first * dt)
     looked_at = np.arange(0, len(q), 1 + len(q) // _RESTS)
     ends = arm.configurations(result.end[looked_at])
-    rest = np.array([bound.clearance.distances(end).min(initial=np.inf) for end in ends])
+    rest = np.array([world.distances(end).min(initial=np.inf) for end in ends])
     at, longest = float(looked_at[rest.argmin()] * dt), int(np.argmax(result.duration))
     detail = (
-        f"proved clear from {len(q)} samples, longest brake {result.duration[longest]:.2g} s at "
+        f"proved clear from {len(q)} samples, longest stop {result.duration[longest]:.2g} s at "
         f"t = {longest * dt:.3f} s, {_nearest(rest.min(), at)} of {len(ends)} ends"
     )
     return Check("stopping", True, detail, _finite(rest.min()), at)

@@ -1,5 +1,5 @@
 """The command line; ``densarm --help`` explains it."""
 
-from densarm.cli.entry_point import main
+from densarm.cli.application import main
 
 __all__ = ["main"]

@@ -3,21 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import asdict
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from densarm.cli.exit_status import ExitStatus
-from densarm.cli.json_file import write_json
-from densarm.cli.output_option import output_option
-from densarm.cli.progress import progress
+from densarm.cli.options import choice_option, number_option, output_option, together
+from densarm.cli.output import print_table, progress, write_json
 from densarm.errors import FileContentError
+from densarm.values.outcome import Outcome
 
 if TYPE_CHECKING:
-    from densarm.bench.problem import Problem
-    from densarm.bench.problem_results import ProblemResults
+    from densarm.scene.loading import MotionProblem
+    from densarm.study.problems import ProblemResults
 
 
 @click.group(no_args_is_help=False)
@@ -34,29 +34,11 @@ def bench() -> None:
 
 @bench.command()
 @click.option("--arm", default="panda", show_default=True, help="A name of `densarm list`.")
-@click.option(
-    "--shapes",
-    type=click.Choice(["hull", "capsule"]),
-    default="hull",
-    show_default=True,
-    help="The arm's collision geometry.",
-)
-@click.option(
-    "--pairs",
-    type=click.IntRange(min=1),
-    default=64,
-    show_default=True,
-    help="Geometry pairs: arm to sphere, filled up by the arm's own.",
-)
-@click.option(
-    "--steps",
-    type=click.IntRange(min=1),
-    default=20_000,
-    show_default=True,
-    help="Steps to be timed, at 1 kHz along a motion.",
-)
+@choice_option("--shapes", ["hull", "capsule"], "The arm's collision geometry.")
+@number_option("--pairs", 64, "Geometry pairs: arm to sphere, filled up by the arm's own.")
+@number_option("--steps", 20_000, "Steps to be timed, at 1 kHz along a motion.")
 @output_option("--json", "FILE", "Write the result as JSON.")
-def step(arm: str, shapes: str, pairs: int, steps: int, json: Path | None) -> int:
+def step(arm: str, shapes: str, pairs: int, steps: int, json: Path | None) -> None:
     """Time one control step of the density tracking controller.
 
     The whole `controller.torque` is compared with bare calls of Pinocchio and coal for the
@@ -73,14 +55,14 @@ def step(arm: str, shapes: str, pairs: int, steps: int, json: Path | None) -> in
     """  # noqa: D301
     with progress() as report:
         report("measuring")
-        from densarm.bench.first_call import time_first_calls
-        from densarm.bench.step import time_step
+        from densarm.study.step import time_first_calls, time_step
 
         result = time_step(arm, shapes, pairs, steps)
         report("compiling in a new process")
-        first = time_first_calls(arm, shapes, pairs)
+        compiled, loaded = time_first_calls(arm, shapes, pairs)
         if json:
-            write_json(json, {**result.to_json(), "first_calls": first.to_json()})
+            first_calls = {"compiled": asdict(compiled), "loaded": asdict(loaded)}
+            write_json(json, {**asdict(result), "first_calls": first_calls})
     click.echo(f"controller.torque  {result.step_us:.1f} µs")
     click.echo(f"bare calls         {result.bare_us:.1f} µs")
     click.echo(f"ratio              {result.ratio:.2f}")
@@ -88,85 +70,53 @@ def step(arm: str, shapes: str, pairs: int, steps: int, json: Path | None) -> in
     for name, times in (
         ("controller.torque", result.step_percentiles_us),
         ("  undisturbed", result.undisturbed_percentiles_us),
-        ("  steady", result.steady_percentiles_us or ()),
+        ("  steady", result.steady_percentiles_us),
         ("bare calls", result.bare_percentiles_us),
     ):
-        if not times:
-            continue
-        at = ", ".join(f"{time:.1f}" for time in times)
-        click.echo(f"{name:<18} {at} µs at 50, 99, 99.9 %")
-    for name, call in (("compiled", first.compiled), ("loaded from disk", first.loaded)):
+        if times:
+            at = ", ".join(f"{time:.1f}" for time in times)
+            click.echo(f"{name:<18} {at} µs at 50, 99, 99.9 %")
+    for name, call in (("compiled", compiled), ("loaded from disk", loaded)):
         made = f"{call.preparation_s:.2f} s before it, kernels {name}"
         click.echo(f"first call         {call.torque_us:.0f} µs, all pairs queried; {made}")
     click.echo(f"resumed step       {result.resumed_us:.0f} µs, after other work")
     click.echo(f"core taken away    {result.switches} times")
     click.echo(f"memory growth      {result.memory_growth_kb:.0f} kB")
     click.echo(f"collections        {result.collections}")
-    return ExitStatus.SUCCESS
 
 
-def _set_options(command: Callable[..., int]) -> Callable[..., int]:
-    """Add the options of commands that run a set of problems."""
-    options = (
-        click.option(
-            "--guide",
-            type=click.Choice(["path", "direct", "both"]),
-            default="path",
-            show_default=True,
-            help="What supplies the sub-goals; both: path, and what direct reaches beside it.",
-        ),
-        click.option(
-            "--time-optimal",
-            is_flag=True,
-            help="Compare each motion with the fastest along its path, by TOPP-RA.",
-        ),
-        click.option(
-            "--jobs", type=click.IntRange(min=1), default=1, show_default=True, help="Processes."
-        ),
-        click.option(
-            "--save-dir",
-            type=click.Path(path_type=Path, file_okay=False),
-            help="Keep every run here; those that are here already are not run again.",
-        ),
-        output_option("--json", "FILE", "Write every problem's result and the figures as JSON."),
-    )
-    for option in reversed(options):
-        command = option(command)
-    return command
+_set_options = together(
+    choice_option(
+        "--guide",
+        ["path", "direct", "both"],
+        "What supplies the sub-goals; both: path, and what direct reaches beside it.",
+    ),
+    click.option(
+        "--time-optimal",
+        is_flag=True,
+        help="Compare each motion with the fastest along its path, by TOPP-RA.",
+    ),
+    number_option("--jobs", 1, "Processes."),
+    click.option(
+        "--save-dir",
+        type=click.Path(path_type=Path, file_okay=False),
+        help="Keep every run here; those that are here already are not run again.",
+    ),
+    output_option("--json", "FILE", "Write every problem's result and the figures as JSON."),
+)
 
 
 @bench.command("random")
 @click.option("--arm", default="panda", show_default=True, help="A name of `densarm list`.")
-@click.option(
+@choice_option(
     "--scenes",
-    type=click.Choice(["mixed", "spheres", "boxes", "wall", "shelf", "none"]),
-    default="mixed",
-    show_default=True,
-    help="What is in the way; mixed: the next four in turn.",
+    ["mixed", "spheres", "boxes", "wall", "shelf", "none"],
+    "What is in the way; mixed: the next four in turn.",
 )
-@click.option(
-    "--problems",
-    type=click.IntRange(min=1),
-    default=50,
-    show_default=True,
-    help="Number of problems.",
-)
-@click.option(
-    "--seed",
-    type=click.IntRange(min=0),
-    default=0,
-    show_default=True,
-    help="Seed of scenes, starts, goals and the planner.",
-)
+@number_option("--problems", 50, "Number of problems.")
+@number_option("--seed", 0, "Seed of scenes, starts, goals and the planner.", least=0)
 @_set_options
-def random(
-    arm: str,
-    scenes: str,
-    problems: int,
-    seed: int,
-    jobs: int,
-    **options: Any,
-) -> int:
+def random(arm: str, scenes: str, problems: int, seed: int, jobs: int, **options: Any) -> None:
     """Move an arm between random configurations among random obstacles.
 
     Spheres, boxes, a wall with a gap or a shelf, in proportion to the arm's reach. Starts and
@@ -183,12 +133,11 @@ def random(
     """  # noqa: D301
     with progress() as report:
         report("loading")
-        from densarm.bench.random_problems import random_problems
+        from densarm.study.random_problems import random_problems
 
         chosen = random_problems(arm, problems, seed, scenes, jobs, report)
-        finish = _run_set(chosen, report, jobs=jobs, **options)
+        finish = _run_set(chosen, report, jobs=jobs, seed=seed, **options)
     finish()
-    return ExitStatus.SUCCESS
 
 
 @bench.command()
@@ -198,15 +147,9 @@ def random(
     required=True,
     help="JSON file of problems.",
 )
-@click.option(
-    "--every",
-    type=click.IntRange(min=1),
-    default=1,
-    show_default=True,
-    help="Run one problem of so many.",
-)
+@number_option("--every", 1, "Run one problem of so many.")
 @_set_options
-def motionbenchmaker(problems: Path, every: int, **options: Any) -> int:
+def motionbenchmaker(problems: Path, every: int, **options: Any) -> None:
     """Run problems of MotionBenchMaker's collection.
 
     Each problem is planned, run as a torque-driven closed loop, and proved. An interrupted
@@ -220,45 +163,83 @@ def motionbenchmaker(problems: Path, every: int, **options: Any) -> int:
     """  # noqa: D301
     with progress() as report:
         report("loading")
-        from densarm.bench.problem import as_problems
-        from densarm.scene_files import load_problems
+        from densarm.scene.loading import load_problems
 
-        chosen = as_problems(load_problems(problems)[::every])
-        finish = _run_set(chosen, report, **options)
+        finish = _run_set(load_problems(problems)[::every], report, **options)
     finish()
-    return ExitStatus.SUCCESS
 
 
 def _run_set(
-    problems: Sequence[Problem],
+    problems: Sequence[MotionProblem],
     report: Callable[[str], None],
     *,
     guide: str,
-    time_optimal: bool,
     jobs: int,
     save_dir: Path | None,
     json: Path | None,
+    **options: Any,
 ) -> Callable[[], None]:
     """Run problems and write what came of them; return what prints it."""
-    from densarm.bench.problem_results import RunOptions, run_problems
-    from densarm.cli.problem_table import print_problem_sets
-    from densarm.scenario import GuideKind
+    from densarm.study.problems import run_problems
 
-    def run(kind: GuideKind, folder: Path | None) -> ProblemResults:
-        if folder:
-            _make_folder(folder)
-        return run_problems(problems, jobs, report, RunOptions(kind, folder, time_optimal))
+    def run(guide: str, folder: Path | None) -> ProblemResults:
+        try:
+            if folder:
+                folder.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise FileContentError(folder, error.strerror or "cannot be made") from None
+        return run_problems(problems, jobs, report, guide=guide, save_dir=folder, **options)
 
-    results = run(GuideKind("path" if guide == "both" else guide), save_dir)
-    direct = run(GuideKind.DIRECT, save_dir and save_dir / "direct") if guide == "both" else None
+    results = run("path" if guide == "both" else guide, save_dir)
+    direct = run("direct", save_dir and save_dir / "direct") if guide == "both" else None
     if json:
         beside = {"direct": direct.to_json()} if direct else {}
         write_json(json, {**results.to_json(), **beside})
     return partial(print_problem_sets, results, direct)
 
 
-def _make_folder(path: Path) -> None:
-    try:
-        path.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise FileContentError(path, error.strerror or "cannot be made") from None
+def print_problem_sets(results: ProblemResults, direct: ProblemResults | None = None) -> None:
+    """Print one row a set of problems: how its runs ended, and percentiles of their measures.
+
+    Args:
+        results: of all sets.
+        direct: of the same problems without a planner, if they were run so too.
+    """
+    print_table(
+        [
+            {"set": name or "all", **_row(results.of(name), direct and direct.of(name))}
+            for name in (*results.sets, None)
+        ],
+        "Medians over the runs that reached the goal; planning 50, 95 and 98 %.",
+    )
+    for result in results.results:
+        if result.outcome != Outcome.REACHED or not result.certified:
+            word = "not certified" if result.outcome == Outcome.REACHED else result.outcome
+            detail = f": {result.detail}" if result.detail else ""
+            click.echo(f"{result.scene} {result.index} {word}{detail}")
+
+
+def _row(part: ProblemResults, direct: ProblemResults | None) -> dict[str, str]:
+    ends = (Outcome.REACHED, Outcome.COLLIDED, Outcome.STUCK, Outcome.NO_PATH)
+    reached, collided, stuck, no_path = counts = [part.count(outcome) for outcome in ends]
+    smallest = part.min_clearance
+    return {
+        "reach-\ned": str(reached),
+        "certi-\nfied": str(part.certified),
+        "colli-\nded": str(collided),
+        "stuck": str(stuck),
+        "no\npath": str(no_path),
+        "else": str(part.total - sum(counts)),
+        "of": str(part.total),
+        "planning\n[s]": _percentiles(part, "plan_time_s", 3),
+        "first\nmotion": _percentiles(part, "preparation_time_s"),
+        "motion\n[s]": _percentiles(part, "motion_s"),
+        "/ opti-\nmal": _percentiles(part, "optimal_ratio"),
+        "path\n[rad]": _percentiles(part, "path_length_rad"),
+        "clear\n[mm]": "" if smallest is None else f"{smallest * 1e3:.1f}",
+        "di-\nrect": "" if direct is None else str(direct.count(Outcome.REACHED)),
+    }
+
+
+def _percentiles(part: ProblemResults, measure: str, count: int = 1) -> str:
+    return " ".join(f"{value:.2f}" for value in (part.percentiles(measure) or [])[:count])

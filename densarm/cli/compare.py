@@ -1,14 +1,30 @@
-"""``densarm compare``: the density and its rivals, side by side."""
+"""``densarm compare``: the density and its baselines, side by side."""
 
-import logging
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
-from densarm.cli.exit_status import ExitStatus
-from densarm.cli.json_file import write_json
-from densarm.cli.output_option import output_option
-from densarm.cli.progress import progress
+from densarm.cli.options import PLOT_ENDINGS, number_option, output_option
+from densarm.cli.output import print_table, progress, write_json
+from densarm.values.outcome import RUN_ENDS, Outcome
+
+if TYPE_CHECKING:
+    from densarm.study.comparison import Comparison
+
+_COUNTED = {
+    "reach-\ned": Outcome.REACHED,
+    "colli-\nded": Outcome.COLLIDED,
+    "stuck": Outcome.STUCK,
+}
+_MEASURED = {
+    "time\n[s]": ("time_s", 1.0, ".2f"),
+    "path\n[rad]": ("path_length_rad", 1.0, ".2f"),
+    "clear\n[mm]": ("min_clearance_m", 1e3, ".1f"),
+    "effort\n[N²m²s]": ("effort", 1.0, ".0f"),
+    "ready\n[s]": ("preparation_time_s", 1.0, ".2f"),
+    "step\n[µs]": ("step_us", 1.0, ".0f"),
+}
 
 
 @click.command()
@@ -19,26 +35,20 @@ from densarm.cli.progress import progress
     help="Some of density, density_direct, potential_field, navigation_function, cbf_qp, "
     "plan_then_track.  [default: all]",
 )
-@click.option(
-    "--starts",
-    type=click.IntRange(min=1),
-    default=5,
-    show_default=True,
-    help="Starts: the scenario's own, the others at random.",
-)
-@click.option(
+@number_option("--starts", 5, "Starts: the scenario's own, the others at random.")
+@number_option(
     "--seed",
-    type=click.IntRange(min=0),
-    help="Seed of the starts and the planner.  [default: what the scenario says, else 0]",
+    None,
+    "Seed of the starts and the planner.  [default: what the scenario says, else 0]",
+    least=0,
 )
-@click.option(
+@number_option(
     "--tuning-starts",
-    type=click.IntRange(min=0),
-    default=3,
-    show_default=True,
-    help="Other starts that each method's main parameter is tuned on; 0 keeps the defaults.",
+    3,
+    "Other starts that each method's main parameter is tuned on; 0 keeps the defaults.",
+    least=0,
 )
-@output_option("--plot", "FILE", "Plot outcomes and measures.", endings=(".png", ".pdf", ".svg"))
+@output_option("--plot", "FILE", "Plot outcomes and measures.", PLOT_ENDINGS)
 @output_option("--json", "FILE", "Write every run and the medians as JSON.")
 def compare(
     scenario: str,
@@ -48,7 +58,7 @@ def compare(
     tuning_starts: int,
     plot: Path | None,
     json: Path | None,
-) -> int:
+) -> None:
     """Compare methods on SCENARIO: a name of `densarm list`, or a TOML file.
 
     Every method drives the arm by torque from the same starts to the scenario's goal, with the same
@@ -72,21 +82,45 @@ def compare(
     """  # noqa: D301
     with progress() as report:
         report("loading")
-        from densarm.cli.comparison_table import print_comparison
-        from densarm.scenario import load_scenario
-        from densarm.study.comparison import compare as compare_methods
-        from densarm.study.methods import METHODS
+        from densarm.scenarios.scenario import load_scenario
+        from densarm.study.baselines import BASELINES
+        from densarm.study.comparison import compare as compare_baselines
+        from densarm.study.comparison import comparison_figure
 
-        names = list(METHODS) if methods is None else methods.split(",")
+        names = list(BASELINES) if methods is None else methods.split(",")
         loaded = load_scenario(scenario)
-        comparison = compare_methods(loaded, names, starts, seed, tuning_starts, report)
+        comparison = compare_baselines(loaded, names, starts, seed, tuning_starts, report)
         report("writing")
         if plot:
-            logging.getLogger("matplotlib").setLevel(logging.ERROR)  # it tells of its font cache
-            from densarm.visualization.comparison_plot import save_comparison_plot
+            from densarm.visualization.figure_style import save_figure
 
-            save_comparison_plot(comparison, plot)
+            save_figure(comparison_figure(comparison), plot)
         if json:
             write_json(json, comparison.to_json())
-    print_comparison(comparison)
-    return ExitStatus.SUCCESS
+    _print_comparison(comparison)
+
+
+def _print_comparison(comparison: "Comparison") -> None:
+    """Print one row a baseline: how its runs ended, and the medians of its measures."""
+    rows = []
+    for result in comparison.baselines:
+        row = {"method": result.baseline}
+        row |= {heading: str(result.count(outcome)) for heading, outcome in _COUNTED.items()}
+        others = set(RUN_ENDS) - set(_COUNTED.values())
+        row["else"] = str(sum(map(result.count, others)))
+        for heading, (measure, scale, form) in _MEASURED.items():
+            value = result.median(measure)
+            row[heading] = "–" if value is None else format(scale * value, form)
+        rows.append(row)
+    tuned = "No parameter was tuned."
+    if comparison.tuning_starts > 0:
+        scales = ", ".join(
+            f"{result.parameter} × {result.scale:g} ({result.baseline})"
+            for result in comparison.baselines
+        )
+        tuned = f"Tuned on {comparison.tuning_starts} other starts: {scales}."
+    print_table(
+        rows,
+        "Medians: of the step over all runs, else over the runs that reached the goal.\n" + tuned,
+        f"{comparison.scenario}, {comparison.starts} starts, seed {comparison.seed}",
+    )

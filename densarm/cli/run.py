@@ -4,12 +4,9 @@ from pathlib import Path
 
 import click
 
-from densarm.cli.exit_status import ExitStatus
 from densarm.cli.first_run import compiling_meanwhile
-from densarm.cli.json_file import write_json
-from densarm.cli.output_option import output_option
-from densarm.cli.picture_options import picture_options, write_pictures
-from densarm.cli.progress import progress
+from densarm.cli.options import number_option, output_option, picture_options
+from densarm.cli.output import print_run, progress, write_json, write_pictures
 
 
 @click.command()
@@ -20,10 +17,8 @@ from densarm.cli.progress import progress
     help="Where sub-goals come from: a collision-free path, or none but the goal.  "
     "[default: what the scenario says, else path]",
 )
-@click.option(
-    "--seed",
-    type=click.IntRange(min=0),
-    help="Seed of the planner.  [default: what the scenario says, else 0]",
+@number_option(
+    "--seed", None, "Seed of the planner.  [default: what the scenario says, else 0]", least=0
 )
 @output_option("--save", "RUN.npz", "Write the recorded run.")
 @picture_options
@@ -33,12 +28,9 @@ def run(
     guide: str | None,
     seed: int | None,
     save: Path | None,
-    html: Path | None,
-    plot: Path | None,
-    png: Path | None,
-    gif: Path | None,
     json: Path | None,
-) -> int:
+    **pictures: Path | None,
+) -> bool:
     """Plan and simulate SCENARIO: a name of `densarm list`, or a TOML file.
 
     Prints how the run ended and what is proved about it. The exit status is 0 if the arm reached
@@ -50,24 +42,32 @@ def run(
       densarm run panda_shelf --png panda_shelf.png --gif panda_shelf.gif
       densarm run my_scenario.toml --guide direct --save run.npz --json run.json
     """  # noqa: D301
-    with progress() as report:
-        report("loading")
-        from densarm.cli.report import print_run
-        from densarm.closed_loop import simulate
-        from densarm.outcome import Outcome
-        from densarm.scenario import load_scenario
+    with progress() as show:
+        doing = "loading"
+        show(doing)
+        from densarm.scenarios.run import run as run_scenario
+        from densarm.scenarios.scenario import load_scenario
+        from densarm.values.kernels import on_compiling
+        from densarm.values.outcome import Outcome
 
-        with compiling_meanwhile():
-            trajectory = simulate(load_scenario(scenario), guide, seed, on_progress=report)
-        report("proving")
-        certificate = trajectory.certificate
-        report("writing")
-        if save:
-            trajectory.save(save)
-        write_pictures(trajectory, html, plot, png, gif)
-        if json:
-            write_json(json, trajectory.summary())
-    print_run(trajectory, certificate)
+        def report(phrase: str) -> None:
+            nonlocal doing
+            doing = phrase
+            show(doing)
+
+        def compiling(begins: bool) -> None:
+            show("compiling, once on this machine" if begins else doing)
+
+        with on_compiling(compiling) as compiled, compiling_meanwhile():
+            done = run_scenario(load_scenario(scenario), guide, seed, on_progress=report)
+            report("proving")
+            certificate = done.certificate
+            report("writing")
+            if save:
+                done.save(save)
+            write_pictures(done, **pictures)
+            if json:
+                write_json(json, done.summary())
+    print_run(done, compiled.seconds)
     proved = all(check.holds for check in certificate.checks if check.name == "swept")
-    reached = trajectory.outcome == Outcome.REACHED
-    return ExitStatus.SUCCESS if reached and proved else ExitStatus.FAILURE
+    return done.outcome == Outcome.REACHED and proved

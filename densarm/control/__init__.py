@@ -1,1 +1,1 @@
-"""Controllers: joint torque from time and state."""
+"""Control: the density's laws, inverse dynamics within the limits, stopping, and a supervisor."""

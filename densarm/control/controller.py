@@ -1,15 +1,17 @@
-"""Controller: joint torque from time and state."""
+"""Controllers: joint torque, or velocity, from time and state."""
 
 import math
+from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from densarm.arm import Arm
-from densarm.arrays import Array
-from densarm.compiled import compiled
-from densarm.validation import finite_vector
+from densarm.arms.arm import Arm
+from densarm.values.arrays import Array
+from densarm.values.checks import finite_vector, positive
+from densarm.values.documented import documented
+from densarm.values.kernels import compiled
 
 _FLOAT = np.dtype(np.float64)
 _NO_STATE = np.empty(0)
@@ -36,13 +38,36 @@ class Controller(Protocol):
         ...
 
 
-def tracking_error(controller: Controller) -> float:
-    """Return the attribute `tracking_error` of a controller that has one, else zero.
+class VelocityController(Protocol):
+    """A feedback law for a system that moves with the velocity it is told."""
 
-    It is how far the joint that is farthest from the reference was from it at the last call
-    [rad or m].
+    def velocity(self, t: float, q: ArrayLike, v: ArrayLike) -> Array:
+        """Return the velocity to command (nv,) [rad/s or m/s]; else as `Controller.torque`."""
+        ...
+
+
+@documented
+@dataclass(frozen=True)
+class Gains:
+    """K_p and K_v, the same on every joint; critically damped by default.
+
+    Raises:
+        InvalidValueError: a gain that is not positive.
     """
-    return float(getattr(controller, "tracking_error", 0.0))
+
+    position: float = 400.0
+    """K_p [1/s²], on the density's gradient."""
+    velocity: float = 40.0
+    """K_v [1/s], on the velocity error."""
+
+    @property
+    def rate(self) -> float:
+        """λ = K_p / K_v [1/s]: the velocity at which K_p ∇ρ and K_v q̇ balance, per ∇ρ."""
+        return self.position / self.velocity
+
+    def __post_init__(self) -> None:
+        positive("position", self.position)
+        positive("velocity", self.velocity)
 
 
 def checked_state(arm: Arm, q: ArrayLike, v: ArrayLike) -> tuple[Array, Array]:
@@ -53,21 +78,18 @@ def checked_state(arm: Arm, q: ArrayLike, v: ArrayLike) -> tuple[Array, Array]:
         x = y = _NO_STATE
     if not (x.flags.carray and y.flags.carray):  # kernels would be compiled for read-only arrays
         x, y = x.copy(), y.copy()
-    if x.ndim == y.ndim == 1 and _is_state(x, y, arm.idx_q, arm.is_circle):
+    if x.shape == (arm.nq,) and y.shape == (arm.nv,) and _is_state(x, y, arm.joint_index):
         return x, y
     return arm.check_configuration("configuration", q), finite_vector("velocity", v, arm.nv)
 
 
 @compiled
-def _is_state(q: Array, v: Array, idx_q: NDArray[np.int64], is_circle: NDArray[np.bool_]) -> bool:
-    last = idx_q.size - 1
-    if v.size != idx_q.size or q.size != idx_q[last] + (2 if is_circle[last] else 1):
-        return False
+def _is_state(q: Array, v: Array, joint_index: NDArray[np.int64]) -> bool:
     for i in range(v.size):
-        x = q[idx_q[i]]
-        if not (math.isfinite(v[i]) and math.isfinite(x)):
-            return False
-        y = q[idx_q[i] + 1] if is_circle[i] else 0.0
-        if is_circle[i] and not abs(x * x + y * y - 1.0) < _UNIT_TOLERANCE:
+        k = joint_index[0, i]
+        off = 0.0 * q[k]  # not a number where q is infinite
+        if joint_index[1, i]:
+            off = q[k] * q[k] + q[k + 1] * q[k + 1] - 1.0
+        if not (abs(off) < _UNIT_TOLERANCE and math.isfinite(v[i])):
             return False
     return True

@@ -5,9 +5,14 @@ import math
 import numpy as np
 import pinocchio as pin
 
-from densarm.arm import Arm
-from densarm.arrays import Array
-from densarm.compiled import compiled
+from densarm.arms.arm import Arm
+from densarm.arms.dynamics import Kinematics
+from densarm.values.arrays import Array
+from densarm.values.kernels import compiled, compiled_part
+
+# Rows of the kernel's table: accelerations, the torques that they need, limits, and the result.
+BRAKE, ATTRACT, _BRAKE_TORQUE, _ATTRACT_TORQUE = 0, 1, 2, 3
+_ACCELERATION_LIMIT, _EFFORT_LIMIT, _ZERO, TORQUE = 4, 5, 6, 7
 
 
 class InverseDynamics:
@@ -21,106 +26,104 @@ class InverseDynamics:
     Args:
         arm: its dynamics and torque limits.
         acceleration_limit: on the sum of both parts (nv,) [rad/s² or m/s²]; may be infinite.
-        mass_data: data in which M is computed at q before every update; None to compute it.
+        kinematics: M, which its owner updates to q before each `update`; None for its own.
+
+    Attributes:
+        terms: M (upper triangle) and H of the last update.
+        rows: table of `limited_torque` (8, nv).
 
     Source: [ZNV] eq. 16-17; saturation [ZNV] eq. 13-14, applied to the attraction alone.
     """
 
     def __init__(
-        self, arm: Arm, acceleration_limit: Array, mass_data: pin.Data | None = None
+        self, arm: Arm, acceleration_limit: Array, kinematics: Kinematics | None = None
     ) -> None:
-        self._model = arm.model
-        self._computes_mass = mass_data is None
-        self._data = arm.model.createData() if mass_data is None else mass_data
-        self._mass = self._data.M
-        limits_and_parts = np.zeros((5, arm.nv))
-        limits_and_parts[:2] = acceleration_limit, arm.limits.effort
-        self.terms: tuple[Array, Array, Array] = (self._mass, self._data.nle, limits_and_parts)
-        """M and H of the last update, limits and parts, as `limited_torque` takes them."""
+        self._updates_kinematics = kinematics is None
+        self._kinematics = kinematics or Kinematics(arm)
+        self.terms: tuple[Array, Array] = (
+            self._kinematics.mass_matrix,
+            self._kinematics.data.nle,
+        )
+        self.rows: Array = np.zeros((8, arm.nv))
+        self.rows[_ACCELERATION_LIMIT] = acceleration_limit
+        self.rows[_EFFORT_LIMIT] = arm.limits.effort
+
+    def load(self) -> None:
+        """Load, or compile, the kernel of `torque` before a control loop."""
+        self.torque(self.rows[_ZERO], self.rows[_ZERO])
 
     def update(self, q: Array, v: Array) -> None:
         """Compute M and H at the state, q (nq,) and v (nv,)."""
-        if self._computes_mass:
-            pin.crba(self._model, self._data, q)
-        pin.nonLinearEffects(self._model, self._data, q, v)
+        kinematics = self._kinematics
+        if self._updates_kinematics:
+            kinematics.update(q)
+        pin.nonLinearEffects(kinematics.model, kinematics.data, q, v)
 
     def mass_matrix(self) -> Array:
         """Return M (nv, nv) at the updated state."""
-        upper = np.triu(self._mass)
+        upper = np.triu(self._kinematics.mass_matrix)
         return np.asarray(upper + np.triu(upper, 1).T)
 
     def brake_torque(self, v: Array, duration: float, shortest: float) -> Array:
-        """Return the torque (nv,) of the straight brake, at the updated state.
+        """Return the torque (nv,) that stops from v (nv,) along a straight line, in a duration [s].
 
-        Args:
-            v: velocity (nv,) [rad/s or m/s].
-            duration: time to go [s]; if infinite the brake is as hard as the limits allow.
-            shortest: time below which it does not count as shorter [s].
+        It counts as `shortest` where it is shorter, or infinite: as hard as the limits allow.
         """
         longest = max(duration, shortest) if math.isfinite(duration) else shortest
-        return self.torque(-v / longest, np.zeros_like(v))
+        return self.torque(-v / longest, self.rows[_ZERO])
 
     def torque(self, brake: Array, attract: Array) -> Array:
         """Return torque (nv,) for accelerations (nv,) [rad/s²] at the updated state."""
-        tau = np.empty(len(brake))
-        limited_torque(*self.terms, brake, attract, tau)
-        return tau
+        self.rows[BRAKE], self.rows[ATTRACT] = brake, attract
+        _limited_torque(*self.terms, self.rows)
+        return np.array(self.rows[TORQUE])
 
 
 @compiled
+def _limited_torque(mass: Array, nonlinear: Array, rows: Array) -> None:
+    limited_torque(mass, nonlinear, rows)
+
+
+@compiled_part
+def limited_torque(mass: Array, nonlinear: Array, rows: Array) -> None:
+    """Write the `TORQUE` of `InverseDynamics` for `BRAKE` and `ATTRACT`, rows of a table (8, nv).
+
+    Of M (nv, nv) the upper triangle is read; H is `nonlinear` (nv,) [N·m or N].
+    """
+    gamma, beta = _shares(rows[_ZERO], rows[BRAKE], rows[ATTRACT], rows[_ACCELERATION_LIMIT])
+    for i in range(nonlinear.shape[0]):
+        brake, attract = 0.0, 0.0
+        for j in range(nonlinear.shape[0]):
+            entry = mass[i, j] if i <= j else mass[j, i]  # crba fills the upper triangle
+            brake += entry * gamma * rows[BRAKE, j]
+            attract += entry * beta * rows[ATTRACT, j]
+        rows[_BRAKE_TORQUE, i] = brake
+        rows[_ATTRACT_TORQUE, i] = attract
+    effort = rows[_EFFORT_LIMIT]
+    gamma, beta = _shares(nonlinear, rows[_BRAKE_TORQUE], rows[_ATTRACT_TORQUE], effort)
+    for i in range(nonlinear.shape[0]):
+        tau = nonlinear[i] + gamma * rows[_BRAKE_TORQUE, i] + beta * rows[_ATTRACT_TORQUE, i]
+        if abs(tau) > effort[i]:
+            tau = math.copysign(effort[i], tau)
+        rows[TORQUE, i] = tau
+
+
+@compiled_part
 def _shares(offset: Array, brake: Array, attract: Array, limit: Array) -> tuple[float, float]:
     """Return (γ, β) that keep |offset + γ brake + β attract| ≤ limit, as the class says."""
-    low, high = 0.0, 1.0
+    low, high, share = 0.0, 1.0, 1.0
     for i in range(limit.shape[0]):
-        base = offset[i] + brake[i]
-        if attract[i] != 0.0:
-            a = (-limit[i] - base) / attract[i]
-            b = (limit[i] - base) / attract[i]
-            low, high = max(low, min(a, b)), min(high, max(a, b))
-        elif abs(base) > limit[i]:
-            high = -1.0
+        base, most = offset[i] + brake[i], math.copysign(limit[i], attract[i])
+        # Without attraction these are infinite, of a sign that tells whether the limit holds.
+        least, largest = (-most - base) / attract[i], (most - base) / attract[i]
+        if least > low:
+            low = least
+        if largest < high:
+            high = largest
+        if brake[i] != 0.0:
+            allowed = (math.copysign(limit[i], brake[i]) - offset[i]) / brake[i]
+            if allowed < share:
+                share = allowed
     if low <= high:
         return 1.0, high
-    share = 1.0
-    for i in range(limit.shape[0]):
-        if brake[i] != 0.0:
-            bound = limit[i] if brake[i] > 0.0 else -limit[i]
-            share = min(share, (bound - offset[i]) / brake[i])
-    return max(share, 0.0), 0.0
-
-
-@compiled
-def limited_torque(
-    mass: Array,
-    nonlinear: Array,
-    limits_and_parts: Array,
-    brake: Array,
-    attract: Array,
-    out: Array,
-) -> None:
-    """Write the torque of `InverseDynamics`.
-
-    Args:
-        mass: M, of which the upper triangle is read (nv, nv).
-        nonlinear: H (nv,) [N·m or N].
-        limits_and_parts: limits of acceleration [rad/s² or m/s²] and torque [N·m or N], zeros, and
-            the parts of the torque, which are overwritten (5, nv).
-        brake: its acceleration (nv,) [rad/s² or m/s²].
-        attract: its acceleration (nv,) [rad/s² or m/s²].
-        out: overwritten (nv,).
-    """
-    nv = nonlinear.shape[0]
-    acceleration_limit, effort_limit = limits_and_parts[0], limits_and_parts[1]
-    zero, brake_torque = limits_and_parts[2], limits_and_parts[3]
-    attract_torque = limits_and_parts[4]
-    gamma, beta = _shares(zero, brake, attract, acceleration_limit)
-    for i in range(nv):
-        brake_torque[i] = attract_torque[i] = 0.0
-        for j in range(nv):
-            entry = mass[i, j] if i <= j else mass[j, i]  # crba fills the upper triangle
-            brake_torque[i] += entry * gamma * brake[j]
-            attract_torque[i] += entry * beta * attract[j]
-    gamma, beta = _shares(nonlinear, brake_torque, attract_torque, effort_limit)
-    for i in range(nv):
-        wanted = nonlinear[i] + gamma * brake_torque[i] + beta * attract_torque[i]
-        out[i] = min(max(wanted, -effort_limit[i]), effort_limit[i])
+    return (share if share > 0.0 else 0.0), 0.0

@@ -1,15 +1,48 @@
 """StateObserver: where the dynamics say that an arm is."""
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from densarm.arm import Arm
-from densarm.arrays import Array
-from densarm.compiled import compiled
-from densarm.control.guard_tolerances import GuardTolerances
+from densarm.arms.arm import Arm
+from densarm.arms.joint_space import joint_error, write_configuration
+from densarm.values.arrays import Array
+from densarm.values.checks import positive
+from densarm.values.documented import documented
+from densarm.values.kernels import compiled
+
+
+@documented
+@dataclass(frozen=True)
+class Tolerances:
+    """How far state and clock may be off before a supervisor stops the arm.
+
+    A model whose accelerations are wrong by δa lets the observed velocity lag by δa · `memory`
+    and the position by δa · `memory`²: the defaults allow 4 rad/s².
+
+    Raises:
+        InvalidValueError: a value that is not positive.
+    """
+
+    position: float = 0.0025
+    """Largest difference of a joint from where the dynamics put it [rad or m]."""
+    velocity: float = 0.1
+    """Largest difference of its velocity [rad/s or m/s]."""
+    memory: float = 0.025
+    """Time in which the observed state forgets such a difference [s]."""
+    tracking: float = 0.02
+    """Largest distance of a joint from the controller's reference, if it has one [rad or m]."""
+    gap: float = 0.005
+    """Longest time between two calls [s]; at least one and a half periods."""
+    delay: float = 0.05
+    """Time for which a state that came unexplained must agree with itself to be believed [s]."""
+
+    def __post_init__(self) -> None:
+        for name in ("position", "velocity", "memory", "tracking", "gap", "delay"):
+            positive(name, getattr(self, name))
 
 
 class StateObserver:
@@ -31,12 +64,13 @@ class StateObserver:
     Source: D. G. Luenberger, An introduction to observers, IEEE TAC 1971.
     """
 
-    def __init__(self, arm: Arm, fastest: Array, tolerances: GuardTolerances) -> None:
+    def __init__(self, arm: Arm, fastest: Array, tolerances: Tolerances) -> None:
         self._arm = arm
         self._data = arm.model.createData()
         self._tolerances = tolerances
         self._fastest = fastest
-        self._angles = np.zeros(arm.nv)
+        self._joint_index = arm.joint_index
+        self._angles, self._off = np.zeros((2, arm.nv))
         self.q: Array = arm.configurations(self._angles)
         """Observed configuration (nq,), overwritten by the next call."""
         self.v: Array = np.zeros(arm.nv)
@@ -50,56 +84,21 @@ class StateObserver:
         self.q[:], self.v[:], self._angles[:] = q, v, self._arm.angles(q)
 
     def advance(self, time: float, step: float, tau: Array) -> None:
-        """Follow the dynamics.
-
-        Args:
-            time: how far [s].
-            step: longest step [s].
-            tau: torque held meanwhile (nv,) [N·m or N].
-        """
+        """Follow the dynamics for a time [s] by steps [s] of at most so long, tau (nv,) held."""
         n = max(math.ceil(time / step - 1e-6), 1)
         for _ in range(n):
             a = pin.aba(self._arm.model, self._data, self.q, self.v, tau)
-            _advance(
-                time / n,
-                a,
-                self._fastest,
-                self._arm.idx_q,
-                self._arm.is_circle,
-                self._angles,
-                self.v,
-                self.q,
-            )
+            _advance(time / n, a, self._fastest, self._joint_index, self._angles, self.v, self.q)
 
     def agrees(self, q: Array, v: Array, time: float) -> bool:
-        """Return whether a measurement agrees; if so, draw the observed state towards it.
+        """Return whether q (nq,) and v (nv,) agree; if so, draw the observed state towards them.
 
-        Args:
-            q: configuration (nq,).
-            v: velocity (nv,) [rad/s or m/s].
-            time: since the last measurement [s]; zero for one that tells nothing new.
+        The time is that since the last measurement [s], zero for one that tells nothing new.
         """
-        return _draw(
-            q,
-            v,
-            min(time / self._tolerances.memory, 1.0),
-            self._tolerances.position,
-            self._tolerances.velocity,
-            self._arm.idx_q,
-            self._arm.is_circle,
-            self._angles,
-            self.v,
-            self.q,
-        )
-
-
-@compiled
-def _write(angles: Array, idx_q: NDArray[np.int64], is_circle: NDArray[np.bool_], q: Array) -> None:
-    for i in range(angles.size):
-        if is_circle[i]:
-            q[idx_q[i]], q[idx_q[i] + 1] = math.cos(angles[i]), math.sin(angles[i])
-        else:
-            q[idx_q[i]] = angles[i]
+        position, velocity = self._tolerances.position, self._tolerances.velocity
+        share, index = min(time / self._tolerances.memory, 1.0), self._joint_index
+        observed = self._angles, self.v, self.q, self._off
+        return _draw(q, v, share, position, velocity, index, *observed)
 
 
 @compiled
@@ -107,17 +106,18 @@ def _advance(
     dt: float,
     a: Array,
     fastest: Array,
-    idx_q: NDArray[np.int64],
-    is_circle: NDArray[np.bool_],
+    joint_index: NDArray[np.int64],
     angles: Array,
     v: Array,
     q: Array,
 ) -> None:
     for i in range(v.size):
         if math.isfinite(a[i]):
-            v[i] = min(max(v[i] + dt * a[i], -fastest[i]), fastest[i])
+            v[i] += dt * a[i]
+            if abs(v[i]) > fastest[i]:
+                v[i] = math.copysign(fastest[i], v[i])
         angles[i] += dt * v[i]
-    _write(angles, idx_q, is_circle, q)
+    write_configuration(angles, joint_index, q)
 
 
 @compiled
@@ -127,26 +127,18 @@ def _draw(
     share: float,
     position: float,
     velocity: float,
-    idx_q: NDArray[np.int64],
-    is_circle: NDArray[np.bool_],
+    joint_index: NDArray[np.int64],
     angles: Array,
     v_observed: Array,
     q_observed: Array,
+    off: Array,
 ) -> bool:
+    joint_error(q_observed, q, joint_index, off)
     for i in range(v.size):
-        off = abs(_difference(q, idx_q[i], is_circle[i], angles[i]))
-        if off > position or abs(v[i] - v_observed[i]) > velocity:
+        if abs(off[i]) > position or abs(v[i] - v_observed[i]) > velocity:
             return False
     for i in range(v.size):
-        angles[i] += share * _difference(q, idx_q[i], is_circle[i], angles[i])
+        angles[i] += share * off[i]
         v_observed[i] += share * (v[i] - v_observed[i])
-    _write(angles, idx_q, is_circle, q_observed)
+    write_configuration(angles, joint_index, q_observed)
     return True
-
-
-@compiled
-def _difference(q: Array, k: int, is_circle: bool, angle: float) -> float:
-    if not is_circle:
-        return float(q[k] - angle)
-    c, s = math.cos(angle), math.sin(angle)
-    return math.atan2(q[k + 1] * c - q[k] * s, q[k] * c + q[k + 1] * s)

@@ -1,13 +1,42 @@
-"""Inverse bump: zero on an unsafe set, one beyond its sensing region, smooth between."""
+"""Inverse bumps, and the smooth step that they are made of.
+
+An inverse bump is zero on an unsafe set, one beyond its sensing region, and smooth between.
+"""
 
 import math
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from densarm.arrays import Array
-from densarm.compiled import compiled
-from densarm.density.smooth_step import log_shifted_step, smooth_step
+from densarm.values.arrays import Array
+from densarm.values.kernels import compiled
+
+T_MIN = 1e-6
+"""Below this argument the step is contact: f̄(T_MIN) = exp(−10⁶) is no longer a double."""
+
+_CONTACT_SLOPE = 1.0 / (T_MIN * T_MIN) + 1.0 / ((1.0 - T_MIN) * (1.0 - T_MIN))
+
+
+def smooth_step(t: ArrayLike) -> Array:
+    r"""Evaluate the smooth step.
+
+    .. math::
+
+        \bar f(t) = \frac{f(t)}{f(t) + f(1 - t)}, \qquad
+        f(t) = \begin{cases} \exp(-1/t) & t > 0 \\ 0 & t \le 0 \end{cases}
+
+    Args:
+        t: arguments of any shape, dimensionless.
+
+    Returns:
+        f̄(t), of the shape of `t`: exactly 0 for t ≤ 0 and exactly 1 for t ≥ 1.
+
+    Source: [ZNV] eq. 5-6.
+    """
+    t = np.asarray(t, dtype=np.float64)
+    inside = np.clip(t, T_MIN, 1.0 - T_MIN)
+    step = np.exp(-np.logaddexp(0.0, 1.0 / inside - 1.0 / (1.0 - inside)))
+    return np.where(t <= 0.0, 0.0, np.where(t >= 1.0, 1.0, step))
 
 
 def inverse_bump(h: ArrayLike, s: ArrayLike, theta: float = 0.0) -> Array:
@@ -41,13 +70,19 @@ def inverse_bump(h: ArrayLike, s: ArrayLike, theta: float = 0.0) -> Array:
 def log_inverse_bump(h: float, width: float, theta: float) -> tuple[float, float]:
     r"""Evaluate ln Ψ of one unsafe set, and its derivative in h at a fixed width.
 
-    With t = h/w, w = h − s, the gradient over the configuration is
+    With t = h/w, w = h − s, it is the logarithm of the shifted smooth step,
 
     .. math::
 
-        \nabla \ln\Psi = \frac{\partial \ln\Psi}{\partial h} (\nabla h - t \nabla w),
+        \ln\Psi = \ln(\bar f(t) + \theta), \qquad
+        \frac{\partial \ln\Psi}{\partial h} = \frac{1}{w} \frac{\bar f}{\bar f + \theta}
+        (1 - \bar f) \left(\frac{1}{t^2} + \frac{1}{(1 - t)^2}\right), \qquad
+        \nabla \ln\Psi = \frac{\partial \ln\Psi}{\partial h} (\nabla h - t \nabla w).
 
-    which equals ∂lnΨ/∂t · (h ∇s − s ∇h)/(h − s)².
+    With the logistic form f̄ = 1/(1 + exp z), z = 1/t − 1/(1−t), nothing overflows. In contact,
+    t < `T_MIN`, Ψ is the constant θ: ``(ln θ, 0)``. For θ = 0 that has no slope, and the slope at
+    `T_MIN` stands for it, so that gradients are finite and still point out of contact:
+    ``(−inf, slope)``.
 
     Args:
         h: function of the unsafe set {h ≤ 0} (m for a clearance).
@@ -55,49 +90,25 @@ def log_inverse_bump(h: float, width: float, theta: float) -> tuple[float, float
         theta: shift θ ≥ 0, dimensionless.
 
     Returns:
-        ln Ψ and ∂lnΨ/∂h at constant width; in contact as `log_shifted_step` has them.
+        ln Ψ and ∂lnΨ/∂h at constant width.
 
-    Source: [ZNV] eq. 7-8.
+    Source: [ZNV] eq. 5-8.
     """
-    if h > 0.0 and h >= width:
+    t = h / width
+    if t >= 1.0 or (h > 0.0 and h >= width):
         return math.log1p(theta), 0.0
-    value, slope = log_shifted_step(h / width, theta)
-    return value, slope / width
-
-
-@compiled
-def accumulate_log_bumps(
-    distance: Array,
-    margin: float,
-    h_gradient: Array,
-    width: Array,
-    theta: float,
-    out_gradient: Array,
-) -> float:
-    r"""Sum ln Ψ over unsafe sets with s_k = h_k − σ_k; add the gradient of the sum in place.
-
-    .. math::
-
-        \sum_k \ln\Psi_k, \qquad \sum_k \frac{\partial \ln\Psi_k}{\partial h_k} \nabla h_k
-
-    Args:
-        distance: values d_k, shape (K,).
-        margin: m, in the unit of `distance`.
-        h_gradient: ∇h_k, shape (K, nv).
-        width: sensing distances σ_k > 0, shape (K,), in the unit of `distance`.
-        theta: shift θ ≥ 0, dimensionless.
-        out_gradient: shape (nv,), added to.
-
-    Returns:
-        Σ ln Ψ_k.
-
-    Source: [ZNV] eq. 7-8.
-    """
-    total = 0.0
-    for k in range(distance.shape[0]):
-        value, slope = log_inverse_bump(distance[k] - margin, width[k], theta)
-        total += value
-        if slope != 0.0:
-            for i in range(out_gradient.shape[0]):
-                out_gradient[i] += slope * h_gradient[k, i]
-    return total
+    if t < T_MIN:
+        if theta > 0.0:
+            return math.log(theta), 0.0
+        return -math.inf, _CONTACT_SLOPE / width
+    from_zero, from_one = 1.0 / t, 1.0 / (1.0 - t)
+    z = from_zero - from_one
+    decay = math.exp(-abs(z))
+    log_step = -max(0.0, z) - math.log1p(decay)
+    complement = (1.0 if z >= 0.0 else decay) / (1.0 + decay)
+    log_value, share = log_step, 1.0
+    if theta > 0.0:
+        log_theta = math.log(theta)
+        log_value = max(log_theta, log_step) + math.log1p(math.exp(-abs(log_step - log_theta)))
+        share = math.exp(log_step - log_value)
+    return log_value, share * complement * (from_zero * from_zero + from_one * from_one) / width

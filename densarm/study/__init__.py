@@ -1,1 +1,1 @@
-"""Studies: many runs of a scenario, and what they say together."""
+"""Studies: baselines, problems by the dozen, and what a control step costs."""

@@ -1,39 +1,50 @@
-"""Comparison: every method from every start, under the same limits, margins, tuning and seeds."""
+"""Comparison: every baseline from every start, under the same limits, margins, tuning and seeds."""
 
+import time
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from typing import Any
+from dataclasses import dataclass, fields, replace
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from densarm.arrays import Array
-from densarm.clear_configurations import clear_configurations
-from densarm.clearance import Clearance
-from densarm.closed_loop import Drive, OnProgress, run_closed_loop
+from densarm.control.controller import Controller
+from densarm.control.speed_law import SpeedParameters
 from densarm.errors import UnknownNameError
-from densarm.fields.speed_law import SpeedParameters
-from densarm.guides.guide import NoPath
-from densarm.outcome import FAILED, RUN_ENDS, Outcome
-from densarm.reference.timing_parameters import TimingParameters
-from densarm.scenario import Scenario
-from densarm.study.methods import MAIN_PARAMETERS, METHODS
-from densarm.study.timed_controller import TimedController
-from densarm.trajectory import Trajectory
-from densarm.validation import non_negative_integer, positive_integer
+from densarm.planning.motion import TimingParameters
+from densarm.scenarios.run import Drive, run_by
+from densarm.scenarios.scenario import Scenario
+from densarm.simulation.simulate import OnProgress
+from densarm.study.baselines import BASELINES, MAIN_PARAMETERS
+from densarm.study.problems import path_length
+from densarm.values.arrays import Array
+from densarm.values.checks import non_negative_integer, positive_integer
+from densarm.values.outcome import FAILED, RUN_ENDS, Outcome
+from densarm.world.configurations import clear_configurations
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 LIMIT_SHARE = 0.9
-"""Share of the velocity, acceleration and torque limits that every method plans with."""
+"""Share of the velocity, acceleration and torque limits that every baseline plans with."""
 
 SCALES = (1.0, 0.2, 5.0)
-"""Multiples of the default of its main parameter that tuning tries on every method."""
+"""Multiples of the default of its main parameter that tuning tries on every baseline."""
 
 _TUNING_SEED = 1_000_003  # added to the seed of the starts that are not tuned on
-_ROOM = 0.005  # [m], that random starts keep beyond the margin
+_START_MARGIN = 0.005  # [m], that random starts keep beyond the safety margin
+_PANELS = {  # of the figure: label and scale of a measure
+    "time_s": ("time [s]", 1.0),
+    "path_length_rad": ("path [rad]", 1.0),
+    "min_clearance_m": ("smallest clearance [mm]", 1e3),
+    "effort": ("effort ∫τ² dt [N²m²s]", 1.0),
+    "step_us": ("step [µs]", 1.0),
+}
 
 
 @dataclass(frozen=True)
-class MethodRun:
-    """One method from one start."""
+class BaselineRun:
+    """One baseline from one start."""
 
     start: tuple[float, ...]
     """Joint positions [rad or m]."""
@@ -56,36 +67,24 @@ class MethodRun:
     step_us: float | None = None
     """Median wall-clock time of one call of the controller [µs]; None where it had none."""
 
-    def to_json(self) -> dict[str, Any]:
-        """Return JSON data."""
-        return {**vars(self), "start": list(self.start)}
 
-
-MEASURES = (
-    "time_s",
-    "path_length_rad",
-    "min_clearance_m",
-    "effort",
-    "plan_time_s",
-    "preparation_time_s",
-    "step_us",
-)
-"""What is measured on a run, as `MethodRun` calls it."""
+MEASURES = tuple(field.name for field in fields(BaselineRun)[3:])
+"""What is measured on a run, as `BaselineRun` calls it."""
 
 
 @dataclass(frozen=True)
-class MethodResult:
-    """One method from all starts."""
+class BaselineResult:
+    """One baseline from all starts."""
 
-    method: str
-    runs: tuple[MethodRun, ...]
+    baseline: str
+    runs: tuple[BaselineRun, ...]
     scale: float = 1.0
     """Of its main parameter, as tuning chose it."""
 
     @property
     def parameter(self) -> str:
         """Name of its main parameter."""
-        return MAIN_PARAMETERS[self.method]
+        return MAIN_PARAMETERS[self.baseline]
 
     def count(self, outcome: str) -> int:
         """Return the number of runs that ended so."""
@@ -104,34 +103,34 @@ class MethodResult:
     def to_json(self) -> dict[str, Any]:
         """Return JSON data."""
         return {
-            "method": self.method,
+            "method": self.baseline,
             "parameter": self.parameter,
             "scale": self.scale,
             **{outcome: self.count(outcome) for outcome in RUN_ENDS},
             **{measure: self.median(measure) for measure in MEASURES},
-            "runs": [run.to_json() for run in self.runs],
+            "runs": [vars(run) for run in self.runs],
         }
 
 
 @dataclass(frozen=True)
 class Comparison:
-    """All methods from all starts."""
+    """All baselines from all starts."""
 
     scenario: str
     seed: int
-    methods: tuple[MethodResult, ...]
+    baselines: tuple[BaselineResult, ...]
     tuning_starts: int
     """Number of other starts that the main parameters were tuned on."""
 
     @property
     def starts(self) -> int:
         """Number of starts."""
-        return len(self.methods[0].runs)
+        return len(self.baselines[0].runs)
 
     def to_json(self) -> dict[str, Any]:
-        """Return JSON data; the measures of a method are medians."""
+        """Return JSON data; the measures of a baseline are medians."""
         return {
-            "methods": [result.to_json() for result in self.methods],
+            "methods": [result.to_json() for result in self.baselines],
             "starts": self.starts,
             "scenario": self.scenario,
             "seed": self.seed,
@@ -142,23 +141,23 @@ class Comparison:
 
 def compare(
     scenario: Scenario,
-    methods: Sequence[str] = tuple(METHODS),
+    baselines: Sequence[str] = tuple(BASELINES),
     starts: int = 5,
     seed: int | None = None,
     tuning_starts: int = 3,
     on_progress: OnProgress = lambda _: None,
 ) -> Comparison:
-    """Run methods from the same starts to the scenario's goal.
+    """Run baselines from the same starts to the scenario's goal.
 
     All get the same arm, scene, margin, time step, time limit and gains, and plan with
     `LIMIT_SHARE` of the velocity, acceleration and torque limits; feedback may use them whole.
-    Every method has one main parameter, `MAIN_PARAMETERS`, and all are tuned alike: of its default
-    times each of `SCALES` the one that reaches from most tuning starts, then the one of the
+    Every baseline has one main parameter, `MAIN_PARAMETERS`, and all are tuned alike: of its
+    default times each of `SCALES` the one that reaches from most tuning starts, then the one of the
     smallest median time, then the first. Tuning starts are drawn by another seed than the starts.
 
     Args:
         scenario: arm, scene, goal, limits and parameters; its own start comes first.
-        methods: names of `METHODS`, at least one.
+        baselines: names of `BASELINES`, at least one.
         starts: number of starts; all but the first are random and touch nothing.
         seed: of the starts and of the planner; None for the scenario's own.
         tuning_starts: number of starts to tune on; 0 keeps the defaults.
@@ -168,90 +167,135 @@ def compare(
         How each run ended. A run that raises an error counts as failed and stops no other.
 
     Raises:
-        UnknownNameError: a method that there is not.
+        UnknownNameError: a baseline that there is not.
         InvalidValueError: a number of starts below one, of tuning starts below zero, or a seed that
             is not a whole number.
         DensarmError: no random start was found.
     """
-    for name in methods:
-        if name not in METHODS:
-            raise UnknownNameError("method", name, METHODS)
-    scenario = _with_equal_limits(scenario, seed)
-    clearance, seed = Clearance(scenario.arm, scenario.scene), scenario.seed
-    room = scenario.control.margin + _ROOM
-    others = clear_configurations(clearance, positive_integer("starts", starts) - 1, seed, room)
-    tuning = clear_configurations(
-        clearance,
-        non_negative_integer("tuning_starts", tuning_starts),
-        seed + _TUNING_SEED,
-        room,
+    for name in baselines:
+        if name not in BASELINES:
+            raise UnknownNameError("method", name, BASELINES)
+    seed = scenario.seed if seed is None else seed
+    scenario = replace(
+        scenario,
+        seed=seed,
+        timing=TimingParameters(LIMIT_SHARE, LIMIT_SHARE, LIMIT_SHARE),
+        speed=SpeedParameters(braking_share=LIMIT_SHARE, velocity_share=LIMIT_SHARE),
     )
+    n_others = positive_integer("starts", starts) - 1
+    n_tuning = non_negative_integer("tuning_starts", tuning_starts)
+    margin = scenario.control.margin + _START_MARGIN
+    others = clear_configurations(scenario.world, n_others, seed, margin)
+    tuning = clear_configurations(scenario.world, n_tuning, seed + _TUNING_SEED, margin)
 
-    def runs(name: str, scale: float, over: Sequence[Array], what: str) -> MethodResult:
+    def runs(name: str, scale: float, over: Sequence[Array], what: str) -> BaselineResult:
         done = []
         for k, start in enumerate(over):
             on_progress(f"{name} from {what} {k + 1} of {len(over)}")
             done.append(_run(replace(scenario, start=start), name, scale))
-        return MethodResult(name, tuple(done), scale)
+        return BaselineResult(name, tuple(done), scale)
 
     results = []
-    for name in dict.fromkeys(methods):
+    for name in dict.fromkeys(baselines):
         tried = [runs(name, scale, tuning, "tuning start") for scale in SCALES if tuning]
         scale = min(tried, key=_rank).scale if tried else 1.0
         results.append(runs(name, scale, [scenario.start, *others], "start"))
     return Comparison(scenario.name, seed, tuple(results), tuning_starts)
 
 
-def _with_equal_limits(scenario: Scenario, seed: int | None) -> Scenario:
-    return replace(
-        scenario,
-        seed=scenario.seed if seed is None else seed,
-        timing=TimingParameters(LIMIT_SHARE, LIMIT_SHARE, LIMIT_SHARE),
-        speed=SpeedParameters(braking_share=LIMIT_SHARE, velocity_share=LIMIT_SHARE),
+def comparison_figure(comparison: Comparison) -> "Figure":
+    """Plot how the runs of each baseline ended, and the measures of those that reached the goal."""
+    # Matplotlib takes a second to import.
+    from matplotlib.ticker import MaxNLocator
+
+    from densarm.visualization.figure_style import BLACK, BLUE, GREY, OUTCOME_COLOUR, new_figure
+
+    colours = {FAILED: BLACK, **{str(end): colour for end, colour in OUTCOME_COLOUR.items()}}
+    results, rows = comparison.baselines, range(len(comparison.baselines))
+    figure = new_figure(10.0, 2.4 + 0.55 * len(rows))
+    figure.suptitle(
+        f"{comparison.scenario}, {comparison.starts} starts: a dot a run that reached the goal, "
+        "a line at the median (steps: of all runs)"
     )
+    outcomes, *panels = figure.subplots(2, 3, sharey=True).ravel()
+    left = np.zeros(len(rows))
+    for outcome in RUN_ENDS:
+        counts = np.array([result.count(outcome) for result in results])
+        if counts.any():
+            colour = colours.get(outcome, GREY)
+            outcomes.barh(rows, counts, left=left, height=0.6, color=colour, label=outcome)
+            left += counts
+    outcomes.set_xlim(0, comparison.starts)
+    outcomes.set_xlabel("runs")
+    outcomes.xaxis.set_major_locator(MaxNLocator(integer=True))
+    outcomes.set_yticks(rows, [result.baseline for result in results])
+    for axes, (measure, (label, scale)) in zip(panels, _PANELS.items(), strict=True):
+        for row, result in enumerate(results):
+            values = scale * np.array(result.values(measure))
+            axes.plot(values, np.full(len(values), row), "o", color=BLUE, markersize=4, alpha=0.5)
+            if values.size:
+                axes.plot(
+                    [np.median(values)] * 2, [row - 0.3, row + 0.3], color=BLACK, linewidth=1.5
+                )
+        axes.set_xlim(left=0.0)
+        axes.grid(axis="x", alpha=0.3)
+        axes.set_xlabel(label)
+    outcomes.set_ylim(len(rows) - 0.5, -0.5)
+    figure.legend(loc="outside lower center", ncols=len(RUN_ENDS), frameon=False)
+    return figure
 
 
-def _rank(result: MethodResult) -> tuple[int, float]:
+class TimedController:
+    """Passes everything on to a controller, and keeps the time of each of its steps.
+
+    Args:
+        controller: what is measured.
+        seconds: to which the duration of each call of `torque` is added [s].
+    """
+
+    def __init__(self, controller: Controller, seconds: list[float]) -> None:
+        self._controller = controller
+        self._seconds = seconds
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._controller, name)
+
+    def torque(self, t: float, q: ArrayLike, v: ArrayLike) -> Array:
+        """Act as `Controller.torque`."""
+        began = time.perf_counter()
+        tau = self._controller.torque(t, q, v)
+        self._seconds.append(time.perf_counter() - began)
+        return tau
+
+
+def _rank(result: BaselineResult) -> tuple[int, float]:
     """Return what orders results from the best: fewest failures, then the smallest median time."""
-    time = result.median("time_s")
-    return -result.count(Outcome.REACHED), np.inf if time is None else time
+    median = result.median("time_s")
+    return -result.count(Outcome.REACHED), np.inf if median is None else median
 
 
-def _run(scenario: Scenario, name: str, scale: float) -> MethodRun:
-    timed: list[TimedController] = []
+def _run(scenario: Scenario, name: str, scale: float) -> BaselineRun:
+    seconds: list[float] = []
 
-    def method(scenario: Scenario, clearance: Clearance) -> Drive | NoPath:
-        drive = METHODS[name](scenario, clearance, scale)
-        if isinstance(drive, NoPath):
-            return drive
-        timed.append(TimedController(drive.controller))
-        return replace(drive, controller=timed[0])
+    def baseline(scenario: Scenario) -> Drive:
+        drive = BASELINES[name](scenario, scale)
+        return replace(drive, controller=TimedController(drive.controller, seconds))
 
+    start = tuple(scenario.arm.angles(scenario.start).tolist())
     try:
-        run = run_closed_loop(scenario, method)
+        run = run_by(scenario, baseline)
     except (ValueError, ArithmeticError, RuntimeError) as error:
-        return MethodRun(_positions(scenario), FAILED, str(error))
-    seconds = timed[0].seconds if timed else []
-    return _measured(run, float(np.median(seconds)) * 1e6 if seconds else None)
-
-
-def _measured(run: Trajectory, step_us: float | None) -> MethodRun:
-    arm, dt = run.scenario.arm, run.scenario.simulation.dt
+        return BaselineRun(start, FAILED, str(error))
     smallest = float(run.clearance.min())
-    steps: Array = arm.difference(run.q[:-1], run.q[1:])
-    return MethodRun(
-        start=_positions(run.scenario),
+    return BaselineRun(
+        start=start,
         outcome=str(run.outcome),
         detail=run.detail,
         time_s=float(run.time[-1]),
-        path_length_rad=float(np.linalg.norm(steps, axis=1).sum()),
+        path_length_rad=path_length(run),
         min_clearance_m=smallest if np.isfinite(smallest) else None,
-        effort=float((run.tau[:-1] ** 2).sum() * dt),
+        effort=float((run.tau[:-1] ** 2).sum() * scenario.simulation.dt),
         plan_time_s=run.plan_time,
         preparation_time_s=run.preparation_time,
-        step_us=step_us,
+        step_us=float(np.median(seconds)) * 1e6 if seconds else None,
     )
-
-
-def _positions(scenario: Scenario) -> tuple[float, ...]:
-    return tuple(scenario.arm.angles(scenario.start).tolist())

@@ -1,7 +1,7 @@
 """Bodies: named surfaces that move with the joints of an arm."""
 
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import product
 
@@ -9,13 +9,13 @@ import coal
 import numpy as np
 import pinocchio as pin
 
-from densarm.arm import Arm
-from densarm.arrays import Array
-from densarm.obstacles import geometry_objects
-from densarm.scene import Scene
-from densarm.shapes import box_hull, extreme_points
+from densarm.arms.arm import Arm
+from densarm.scene.obstacles import geometry_objects
+from densarm.scene.scene import Scene
+from densarm.scene.shapes import box_hull, extreme_points
+from densarm.values.arrays import Array
 from densarm.visualization.palette import BOARD, OBSTACLE, SENSING, Color
-from densarm.visualization.triangle_mesh import TriangleMesh, mesh_of, rounded_hull
+from densarm.visualization.triangle_mesh import TriangleMesh, mesh_of, sphere_swept_hull
 
 WORLD = 0
 """Index of the joint that carries what does not move."""
@@ -43,11 +43,7 @@ class Body:
         return not isinstance(self.shape, coal.Halfspace)
 
     def corners(self, joint_poses: Sequence[pin.SE3]) -> Array:
-        """Return the corners (8, 3) of the bounding box in the world frame [m].
-
-        Args:
-            joint_poses: pose of each joint in the world.
-        """
+        """Return the bounding box's corners (8, 3) in the world [m], given the joints' poses."""
         pose = joint_poses[self.joint] * self.placement
         return np.asarray(self._local_corners @ pose.rotation.T + pose.translation)
 
@@ -63,11 +59,7 @@ def arm_bodies(arm: Arm) -> tuple[Body, ...]:
     visual = list(arm.visual_model.geometryObjects)
     seen = {item.parentFrame for item in visual}
     plain = [item for item in arm.collision_model.geometryObjects if item.parentFrame not in seen]
-    return tuple(
-        _body(item, (float(red), float(green), float(blue)))
-        for item in visual + plain
-        for red, green, blue, _ in [item.meshColor]
-    )
+    return tuple(_body(item, tuple(item.meshColor[:3].tolist())) for item in visual + plain)
 
 
 def obstacle_bodies(scene: Scene) -> tuple[Body, ...]:
@@ -77,32 +69,19 @@ def obstacle_bodies(scene: Scene) -> tuple[Body, ...]:
     """
     return tuple(
         _board(item) if isinstance(item.geometry, coal.Halfspace) else _body(item, OBSTACLE)
-        for item in _obstacles(scene)
+        for obstacle in scene
+        for item in geometry_objects(obstacle)
     )
 
 
-def sensing_bodies(scene: Scene, distance: float) -> tuple[Body, ...]:
-    """Return all that is within a distance of each obstacle that has an end.
-
-    Args:
-        scene: the obstacles.
-        distance: from their surfaces [m].
-    """
-    bodies = []
-    for item in _obstacles(scene):
-        if isinstance(item.geometry, coal.Halfspace):
-            continue
-        points, radius = extreme_points(item.geometry)
-        mesh = rounded_hull(points, radius + distance)
-        bodies.append(
-            Body(item.name, item.parentJoint, item.placement, mesh, SENSING, item.geometry)
-        )
-    return tuple(bodies)
-
-
-def _obstacles(scene: Scene) -> Iterable[pin.GeometryObject]:
-    for obstacle in scene:
-        yield from geometry_objects(obstacle)
+def sensing_bodies(obstacles: Sequence[Body], distance: float) -> tuple[Body, ...]:
+    """Return all that is within a distance [m] of each obstacle that has an end."""
+    return tuple(
+        replace(body, mesh=sphere_swept_hull(points, radius + distance), color=SENSING)
+        for body in obstacles
+        if body.has_end
+        for points, radius in [extreme_points(body.shape)]
+    )
 
 
 def _board(item: pin.GeometryObject) -> Body:
@@ -115,6 +94,5 @@ def _board(item: pin.GeometryObject) -> Body:
 
 
 def _body(item: pin.GeometryObject, color: Color) -> Body:
-    return Body(
-        item.name, item.parentJoint, item.placement, mesh_of(item.geometry), color, item.geometry
-    )
+    shape = item.geometry
+    return Body(item.name, item.parentJoint, item.placement, mesh_of(shape), color, shape)

@@ -1,6 +1,6 @@
 """Camera: where to look from so that given points fill the picture."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from itertools import product
 
@@ -8,7 +8,7 @@ import coal
 import numpy as np
 import pinocchio as pin
 
-from densarm.arrays import Array
+from densarm.values.arrays import Array
 from densarm.visualization.bodies import Body
 
 FIELD_OF_VIEW = 35.0
@@ -16,6 +16,7 @@ FIELD_OF_VIEW = 35.0
 
 _ASPECT = 1.3  # width over height of the narrowest window that still shows everything
 _FILL = 0.76  # part of the picture that the points may take; words stand above and below
+_BEFORE = 0.1  # least depth of the nearest point, as a part of what the points extend
 _SLANTS = ((1.0, 1.0, 0.7), (0.4, 1.0, 0.6), (1.0, 0.4, 0.6))  # in front, aside, above
 _SIDES = tuple(product((1.0, -1.0), (-1.0, 1.0)))  # signs of x and y, the usual ones first
 _SIGHT = 2e-3  # thickness of a line of sight [m]
@@ -34,23 +35,17 @@ class Camera:
 
     @classmethod
     def facing(
-        cls, points: Array, watched: Array | None = None, obstacles: Sequence[Body] = ()
+        cls, points: Array, watched: Iterable[Array] = (), obstacles: Sequence[Body] = ()
     ) -> "Camera":
-        """Return a camera that sees all points and, of what is watched, as much as it can.
+        """Return a camera that sees points (N, 3) [m] and most of those watched, past obstacles.
 
         It looks along the directions in which the points extend least: straight at the plane of a
-        planar arm, and from a corner at an arm that moves in space, the corner from where
-        obstacles hide least.
-
-        Args:
-            points: (N, 3) in the world frame [m], N ≥ 1.
-            watched: points (W, 3) that obstacles should not hide [m]; None for none.
-            obstacles: bodies at rest in the world.
+        planar arm, and from a corner at an arm that moves in space.
         """
         cameras = [cls._along(points, slant, side) for side in _SIDES for slant in _SLANTS]
-        if watched is None or not obstacles:
-            return cameras[0]
-        return max(cameras, key=lambda camera: camera._seen(watched, obstacles))
+        return min(
+            cameras, key=lambda camera: sum(camera._is_hidden(at, obstacles) for at in watched)
+        )
 
     @property
     def axes(self) -> Array:
@@ -73,12 +68,9 @@ class Camera:
         from_right = (seen[:, 2:] + seen[:, :2] / width).max(axis=0)
         from_left = (seen[:, 2:] - seen[:, :2] / width).max(axis=0)
         aside = width * (from_right - from_left) / 2.0
-        distance = float((from_right + from_left).max() / 2.0)
+        nearest = seen[:, 2].max() + _BEFORE * np.max(high - low)
+        distance = max(float((from_right + from_left).max() / 2.0), float(nearest))
         return cls(target + aside @ camera.axes[:2], distance * camera.offset)
-
-    def _seen(self, watched: Array, obstacles: Sequence[Body]) -> int:
-        """Return how many points (W, 3) no obstacle hides."""
-        return sum(not self._is_hidden(point, obstacles) for point in watched)
 
     def _is_hidden(self, point: Array, obstacles: Sequence[Body]) -> bool:
         sight = self.target + self.offset - point
@@ -86,10 +78,9 @@ class Camera:
         rotation = pin.Quaternion.FromTwoVectors(np.array([0.0, 0.0, 1.0]), sight).matrix()
         line = coal.Capsule(_SIGHT / 2.0, length)
         pose = coal.Transform3s(rotation, point + sight / 2.0)
-        request, result = coal.CollisionRequest(), coal.CollisionResult()
+        request = coal.CollisionRequest()
         for body in obstacles:
             place = coal.Transform3s(body.placement.rotation, body.placement.translation)
-            result.clear()
-            if coal.collide(line, pose, body.shape, place, request, result):
+            if coal.collide(line, pose, body.shape, place, request, coal.CollisionResult()):
                 return True
         return False

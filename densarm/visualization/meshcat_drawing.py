@@ -1,5 +1,6 @@
-"""A stage, drawn by meshcat's commands."""
+"""A render scene, drawn by meshcat's commands."""
 
+from collections.abc import Sequence
 from typing import Any
 
 import meshcat
@@ -8,24 +9,30 @@ import meshcat.geometry
 import numpy as np
 import pinocchio as pin
 
-from densarm.arrays import Array
+from densarm.values.arrays import Array
 from densarm.visualization import palette
-from densarm.visualization.bodies import Body
+from densarm.visualization.bodies import Body, sensing_bodies
 from densarm.visualization.camera import FIELD_OF_VIEW
 from densarm.visualization.palette import Color, hexadecimal
-from densarm.visualization.stage import Stage
+from densarm.visualization.render_scene import RenderScene
 from densarm.visualization.triangle_mesh import TriangleMesh
 
 _SKY, _HORIZON = [1.0, 1.0, 1.0], [0.86, 0.89, 0.92]
 _LIGHTS = {"AmbientLight": 0.5, "FillLight": 0.3}  # meshcat's own values bleach light colours
+_GOAL_LOOK = {
+    "color": hexadecimal(palette.GOAL),
+    "opacity": palette.GOAL_OPACITY,
+    "side": 0,
+    "depthWrite": False,
+    # The arm at its goal covers its copy instead of flickering with it.
+    "polygonOffset": True,
+    "polygonOffsetFactor": 1.0,
+    "polygonOffsetUnits": 1.0,
+}
 
 
 class MeshGeometry(meshcat.geometry.Geometry):
-    """A triangle mesh as three.js reads it.
-
-    Args:
-        mesh: the triangles.
-    """
+    """A triangle mesh as three.js reads it."""
 
     def __init__(self, mesh: TriangleMesh) -> None:
         super().__init__()
@@ -44,32 +51,38 @@ class MeshGeometry(meshcat.geometry.Geometry):
         return {"uuid": self.uuid, "type": "BufferGeometry", "data": data}
 
 
-def draw(stage: Stage, viewer: meshcat.Visualizer) -> None:
-    """Draw a stage with its motion as an animation, the sensing region hidden.
-
-    Args:
-        stage: what to draw.
-        viewer: where to.
-    """
-    _draw_surroundings(viewer, stage)
-    _place_camera(viewer, stage)
-    geometries = {body.name: MeshGeometry(body.mesh) for body in stage.robot}
-    for body in stage.robot:
-        node = viewer["robot"][stage.joints[body.joint]][body.name]
-        _draw_body(node, body, geometries[body.name], color=hexadecimal(body.color))
-        node = viewer["goal"][stage.joints[body.joint]][body.name]
-        _draw_body(node, body, geometries[body.name], **_goal_look())
-    _draw_obstacles(viewer, stage)
-    _place_joints(viewer["robot"], stage, stage.q[0])
-    _place_joints(viewer["goal"], stage, stage.run.scenario.goal)
-    if stage.path is not None:
+def draw(scene: RenderScene, viewer: meshcat.Visualizer) -> None:
+    """Draw a render scene with its motion as an animation, the sensing region hidden."""
+    _draw_surroundings(viewer, scene)
+    _place_camera(viewer, scene)
+    meshes = [MeshGeometry(body.mesh) for body in scene.robot]
+    _draw_arm(viewer["robot"], scene, meshes, scene.q[0])
+    if (goal := scene.run.task.goal) is not None:
+        _draw_arm(viewer["goal"], scene, meshes, goal, _GOAL_LOOK)
+    _draw_obstacles(viewer, scene)
+    if scene.path is not None:
         look = meshcat.geometry.MeshBasicMaterial(vertexColors=True)
-        viewer["path"].set_object(MeshGeometry(stage.path), look)
+        viewer["path"].set_object(MeshGeometry(scene.path), look)
     look = meshcat.geometry.MeshBasicMaterial(color=hexadecimal(palette.CLOSEST))
-    for name, (mesh, transforms) in stage.closest_line.items():
+    for name, (mesh, transforms) in scene.closest_line.items():
         viewer["closest"][name].set_object(MeshGeometry(mesh), look)
         viewer["closest"][name].set_transform(transforms[0])
-    viewer.set_animation(_animation(viewer, stage), play=False)
+    viewer.set_animation(_animation(viewer, scene), play=False)
+
+
+def _draw_arm(
+    node: meshcat.Visualizer,
+    scene: RenderScene,
+    meshes: Sequence[MeshGeometry],
+    q: Array,
+    look: dict[str, Any] | None = None,
+) -> None:
+    """Draw the arm at q (nq,), in its own colours or with another look."""
+    for body, mesh in zip(scene.robot, meshes, strict=True):
+        own_look = {"color": hexadecimal(body.color)}
+        _draw_body(node[scene.joints[body.joint]][body.name], body, mesh, **(look or own_look))
+    for name, pose in zip(scene.joints, scene.joint_poses(q), strict=True):
+        node[name].set_transform(pose.homogeneous)
 
 
 def _draw_body(
@@ -79,29 +92,17 @@ def _draw_body(
     node.set_transform(body.placement.homogeneous)
 
 
-def _goal_look() -> dict[str, Any]:
-    return {
-        "color": hexadecimal(palette.GOAL),
-        "opacity": palette.GOAL_OPACITY,
-        "side": 0,
-        "depthWrite": False,
-        # The arm at its goal covers its copy instead of flickering with it.
-        "polygonOffset": True,
-        "polygonOffsetFactor": 1.0,
-        "polygonOffsetUnits": 1.0,
-    }
-
-
-def _draw_obstacles(viewer: meshcat.Visualizer, stage: Stage) -> None:
+def _draw_obstacles(viewer: meshcat.Visualizer, scene: RenderScene) -> None:
+    sensing = sensing_bodies(scene.obstacles, scene.sensing_distance)
     for group, bodies, opacity in (
-        ("obstacles", stage.obstacles, palette.OBSTACLE_OPACITY),
-        ("sensing", stage.sensing, palette.SENSING_OPACITY),
+        ("obstacles", scene.obstacles, palette.OBSTACLE_OPACITY),
+        ("sensing", sensing, palette.SENSING_OPACITY),
     ):
         for body in bodies:
             look = {"color": hexadecimal(body.color), "opacity": opacity}
             node = viewer[group][body.name]
             _draw_body(node, body, MeshGeometry(body.mesh), side=0, depthWrite=False, **look)
-            if group == "obstacles" and len(body.mesh.edges):
+            if len(body.mesh.edges):
                 _draw_lines(node["edges"], body.mesh.edges, palette.EDGE)
     viewer["sensing"].set_property("visible", False)
 
@@ -112,7 +113,7 @@ def _draw_lines(node: meshcat.Visualizer, lines: Array, color: Color) -> None:
     node.set_object(meshcat.geometry.LineSegments(ends, look))
 
 
-def _draw_surroundings(viewer: meshcat.Visualizer, stage: Stage) -> None:
+def _draw_surroundings(viewer: meshcat.Visualizer, scene: RenderScene) -> None:
     background = viewer["/Background"]
     background.set_property("top_color", _SKY)
     background.set_property("bottom_color", _HORIZON)
@@ -120,31 +121,26 @@ def _draw_surroundings(viewer: meshcat.Visualizer, stage: Stage) -> None:
         viewer[node].set_property("visible", False)
     for light, intensity in _LIGHTS.items():
         viewer[f"/Lights/{light}/<object>"].set_property("intensity", intensity)
-    _draw_lines(viewer["floor"], stage.floor, palette.FLOOR)
+    _draw_lines(viewer["floor"], scene.floor, palette.FLOOR)
 
 
-def _place_camera(viewer: meshcat.Visualizer, stage: Stage) -> None:
+def _place_camera(viewer: meshcat.Visualizer, scene: RenderScene) -> None:
     # The camera always looks at its node's origin, so the drawing moves instead.
     shift = np.eye(4)
-    shift[:3, 3] = -stage.camera.target
+    shift[:3, 3] = -scene.camera.target
     viewer.set_transform(shift)
     lens = viewer["/Cameras/default/rotated/<object>"]
     lens.set_property("fov", FIELD_OF_VIEW)
-    x, y, z = stage.camera.offset.tolist()
+    x, y, z = scene.camera.offset.tolist()
     lens.set_property("position", [x, z, -y])  # this node has y upwards
 
 
-def _place_joints(node: meshcat.Visualizer, stage: Stage, q: Array) -> None:
-    for name, pose in zip(stage.joints, stage.joint_poses(q), strict=True):
-        node[name].set_transform(pose.homogeneous)
-
-
-def _animation(viewer: meshcat.Visualizer, stage: Stage) -> meshcat.animation.Animation:
+def _animation(viewer: meshcat.Visualizer, scene: RenderScene) -> meshcat.animation.Animation:
     """Return the motion of the joints for meshcat's time line, which counts seconds."""
-    poses = np.array([[pin.SE3ToXYZQUAT(pose) for pose in stage.joint_poses(q)] for q in stage.q])
-    seconds = stage.time.tolist()
+    poses = np.array([[pin.SE3ToXYZQUAT(pose) for pose in scene.joint_poses(q)] for q in scene.q])
+    seconds = scene.time.tolist()
     animation = meshcat.animation.Animation()
-    for joint, name in list(enumerate(stage.joints))[1:]:
+    for joint, name in list(enumerate(scene.joints))[1:]:
         tracks = {
             "position": ("vector3", poses[:, joint, :3]),
             "quaternion": ("quaternion", poses[:, joint, 3:]),

@@ -1,14 +1,16 @@
 """TriangleMesh: surfaces as triangles, alike for the page and for pictures."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass
-from itertools import pairwise
+from itertools import chain, pairwise
+from operator import itemgetter
 
 import coal
 import numpy as np
 from numpy.typing import NDArray
 
-from densarm.arrays import Array
-from densarm.shapes import box_hull, circumscribed_cylinder, convex_hull, extreme_points
+from densarm.scene.shapes import box_hull, circumscribed_cylinder, convex_hull, extreme_points
+from densarm.values.arrays import Array
 
 _CREASE = np.cos(np.radians(40.0))
 """Cosine of the angle between faces from which on the edge between them is sharp."""
@@ -44,15 +46,13 @@ def mesh_of(shape: coal.CollisionGeometry) -> TriangleMesh:
         shape = box_hull(2.0 * shape.halfSide)
     elif isinstance(shape, coal.Cylinder):
         shape = circumscribed_cylinder(shape.radius, 2.0 * shape.halfLength)
-    return rounded_hull(*extreme_points(shape))
+    return sphere_swept_hull(*extreme_points(shape))
 
 
-def rounded_hull(points: Array, radius: float) -> TriangleMesh:
-    """Return the convex hull of equal balls, with sharp edges if they are points.
+def sphere_swept_hull(points: Array, radius: float) -> TriangleMesh:
+    """Return the convex hull of balls of a radius ≥ 0 [m] about points (N, 3) [m].
 
-    Args:
-        points: centres of the balls (N, 3) [m].
-        radius: of the balls [m], r ≥ 0.
+    It has sharp edges if the balls are points.
     """
     if radius > 0.0:
         points = (points[:, np.newaxis] + radius * _ball()).reshape(-1, 3)
@@ -63,12 +63,9 @@ def rounded_hull(points: Array, radius: float) -> TriangleMesh:
 
 
 def tube(points: Array, radius: float, colors: Array) -> TriangleMesh:
-    """Return a tube along a curve.
+    """Return a tube of a radius [m] along points (N, 3) [m], no two neighbours the same.
 
-    Args:
-        points: (N, 3) on the curve [m], N ≥ 2, all different from their neighbours.
-        radius: of the tube [m].
-        colors: at each of the points (N, 3), 0 to 1.
+    It has a colour at each of the points (N, 3).
     """
     along = np.gradient(points, axis=0)
     along /= np.linalg.norm(along, axis=1, keepdims=True)
@@ -97,8 +94,10 @@ def tube(points: Array, radius: float, colors: Array) -> TriangleMesh:
     )
 
 
-def _corners(triangles: object) -> NDArray[np.int64]:
-    return np.array([(t[0], t[1], t[2]) for t in triangles], dtype=np.int64)  # type: ignore[attr-defined]
+def _corners(triangles: Iterable[coal.Triangle]) -> NDArray[np.int64]:
+    # Meshes have a hundred thousand triangles, and coal hands them out one by one.
+    corners = chain.from_iterable(map(itemgetter(0, 1, 2), triangles))
+    return np.fromiter(corners, dtype=np.int64).reshape(-1, 3)
 
 
 def _ball() -> Array:
@@ -131,10 +130,9 @@ def _smooth(vertices: Array, faces: NDArray[np.int64]) -> TriangleMesh:
 
 
 def _creased(vertices: Array, faces: NDArray[np.int64]) -> TriangleMesh:
-    """Return a convex mesh whose faces are smooth against some neighbours and not against others.
+    """Return a mesh with a vertex for each corner of each face.
 
-    Each corner of each face gets a vertex of its own, with the mean normal of those faces around
-    it that lie about as this one.
+    Its normal is the mean of those faces around it that lie about as this one.
     """
     area_normals = _face_normals(vertices, faces)
     directions = _unit(area_normals)

@@ -7,19 +7,18 @@ import fig4_complex_environments as fig4
 import fig5_c_shape
 import fig6_bounded_control
 import numpy as np
+import paper_figure as paper
 from matplotlib.figure import Figure
 
-from densarm.arrays import Array
-from densarm.density.assumptions import SceneAssumptions, check_assumptions
-from densarm.density.euclidean_density import EuclideanDensity
-from densarm.density.gauge import Gauge
-from densarm.density.implicit_function import smallest_value
-from densarm.density.implicit_shapes import Ellipsoid
-from densarm.density.navigation_density import DensityParameters
-from densarm.fields.integral_curves import CurveParameters, integral_curves
-from densarm.outcome import Outcome
+from densarm.density.navigation_density import DensityParameters, Gauge
+from densarm.euclidean.assumptions import SceneAssumptions, check_assumptions
+from densarm.euclidean.density import EuclideanDensity
+from densarm.euclidean.implicit import smallest_value
+from densarm.euclidean.integral_curves import CurveParameters, integral_curves
+from densarm.euclidean.shapes import Ellipsoid
+from densarm.values.arrays import Array
+from densarm.values.outcome import Outcome
 from densarm.visualization import figure_style as style
-from densarm.visualization.figure_report import FigureReport, figure_arguments
 
 EPSILON = 1e-2  # occupancy for which the bound on θ is given [s mⁿ]
 THETAS = (1e-2, 1e-1, 1.0)
@@ -39,17 +38,17 @@ class Scene:
         parameters = DensityParameters(self.density.parameters.alpha, theta, Gauge.LOG)
         return EuclideanDensity(self.density.unsafe, self.density.goal, parameters)
 
-    def starts(self, count: int) -> tuple[tuple[Array, float], tuple[Array, float]]:
+    def starts(self, count: int) -> list[tuple[Array, float]]:
         """Starts outside the sensing regions, and inside, each with its region's measure [mⁿ]."""
         low, high = self.extent.T
         x = np.random.default_rng(10).uniform(low, high, (200 * count + 2000, low.size))
         free = smallest_value(self.density.obstacles, x) > 0.0
         sensed = smallest_value([region.s for region in self.density.unsafe], x) < 0.0
         box = float(np.prod(high - low))
-        return tuple(
+        return [
             (x[chosen][:count], box * float(chosen.mean()))
             for chosen in (free & ~sensed, free & sensed)
-        )
+        ]
 
 
 def scenes() -> list[Scene]:
@@ -74,6 +73,9 @@ class Leak:
     entered: int  # of the starts
     starts: int
     occupancy: float  # time spent in the unsafe sets, over the measure of the starts [s mⁿ]
+
+
+Leaks = dict[float, tuple[Leak, ...]]  # by θ
 
 
 def leaks_of(scene: Scene, theta: float, count: int) -> tuple[Leak, ...]:
@@ -104,10 +106,13 @@ def time_inside(density: EuclideanDensity, x: Array) -> Array:
     inside = np.logical_and.accumulate(inside, axis=1)
     length = np.linalg.norm(density.goal - x, axis=1)
     speed = np.linalg.norm(density.gradient(way, Gauge.DENSITY), axis=-1) / others
-    return np.sum(np.where(inside, 1.0 / np.maximum(speed, 1e-300), 0.0), axis=1) * length / PIECES
+    slowness = np.where(inside, 1.0 / np.maximum(speed, 1e-300), 0.0)
+    return np.asarray(slowness.sum(axis=1) * length / PIECES)
 
 
-def draw_table(found: dict[str, SceneAssumptions], leaks: dict, alphas: dict) -> Figure:
+def draw_table(
+    found: dict[str, SceneAssumptions], leaks: dict[str, Leaks], alphas: dict[str, float]
+) -> Figure:
     figure = style.new_figure(11.5, 3.6)
     ax = figure.subplots()
     ax.set_axis_off()
@@ -154,7 +159,7 @@ def percentages(leaks: list[Leak]) -> str:
     return "; ".join(f"{100.0 * each.entered / each.starts:.1f}" for each in leaks) + " %"
 
 
-def draw_occupancy(leaks: dict, promised: dict) -> Figure:
+def draw_occupancy(leaks: dict[str, Leaks], promised: dict[str, float]) -> Figure:
     figure = style.new_figure(8.0, 4.4)
     ax = figure.subplots()
     colours = (style.BLUE, style.ORANGE, style.GREEN, style.VERMILION, style.PURPLE, style.SKY,
@@ -175,7 +180,7 @@ def draw_occupancy(leaks: dict, promised: dict) -> Figure:
 
 
 def main(arguments: list[str] | None = None) -> None:
-    options = figure_arguments(__doc__, starts=100, arguments=arguments)
+    options = paper.figure_arguments(__doc__, starts=100, arguments=arguments)
     every = scenes()
     found = {
         scene.name: check_assumptions(
@@ -189,9 +194,9 @@ def main(arguments: list[str] | None = None) -> None:
     }
     alphas = {scene.name: scene.density.parameters.alpha for scene in every}
     promised = {name: 1.0 / a.largest_theta(1.0, alphas[name]) for name, a in found.items()}
-    style.save_figure(draw_table(found, leaks, alphas), options.out, "assumptions_table")
-    style.save_figure(draw_occupancy(leaks, promised), options.out, "assumptions_occupancy")
-    FigureReport(
+    paper.save_figure(draw_table(found, leaks, alphas), options.out, "assumptions_table")
+    paper.save_figure(draw_occupancy(leaks, promised), options.out, "assumptions_occupancy")
+    paper.FigureReport(
         "The theorem's assumptions",
         "Every scene of Figs. 3 to 7 meets Assumption 2 of [ZNV], and the time that starts in and "
         "out of the sensing regions spend in unsafe sets stays within the proof's bound.",
@@ -213,7 +218,7 @@ def main(arguments: list[str] | None = None) -> None:
     ).write(options.out)
 
 
-def scene_numbers(a: SceneAssumptions, by_theta: dict, alpha: float) -> dict[str, object]:
+def scene_numbers(a: SceneAssumptions, by_theta: Leaks, alpha: float) -> dict[str, object]:
     return {
         "unsafe_sets": len(a.volume),
         "between_sets_m": finite(a.unsafe_gap),

@@ -6,23 +6,22 @@ counts so. The time is measured along trajectories and compared with ρ cell by 
 """
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
+import paper_figure as paper
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle
 from numpy.typing import NDArray
 
-from densarm.arrays import Array
-from densarm.density.divergence import rantzer_map
-from densarm.density.euclidean_density import EuclideanDensity
-from densarm.density.gauge import Gauge
-from densarm.density.implicit_function import Placed, UnsafeRegion, smallest_value
-from densarm.density.implicit_shapes import Ball, Ellipsoid
-from densarm.density.navigation_density import DensityParameters
-from densarm.fields.integral_curves import CurveParameters, IntegralCurves, integral_curves
-from densarm.outcome import Outcome
+from densarm.density.navigation_density import DensityParameters, Gauge
+from densarm.euclidean.density import EuclideanDensity, rantzer_map
+from densarm.euclidean.implicit import Placed, UnsafeRegion, smallest_value
+from densarm.euclidean.integral_curves import CurveParameters, IntegralCurves, integral_curves
+from densarm.euclidean.shapes import Ball, Ellipsoid
+from densarm.values.arrays import Array
+from densarm.values.outcome import Outcome
 from densarm.visualization import figure_style as style
-from densarm.visualization.figure_report import FigureReport, figure_arguments
 
 GOAL = np.array([3.0, -2.7])  # [m]
 HALF = 5.0  # the picture is the square |x_i| <= HALF [m]
@@ -86,7 +85,7 @@ BORDER = [(end, order) for end in (-HALF, HALF) for order in ([0, 1], [1, 0])]
 
 def influx(edge: Array, end: float, order: list[int]) -> Array:
     """ρ k · n into the square, at points of an edge (N, 2)."""
-    inward = -np.sign(end) * FIELD.gradient(edge, Gauge.LOG)[:, order[0]]
+    inward: Array = -np.sign(end) * FIELD.gradient(edge, Gauge.LOG)[:, order[0]]
     return np.exp(2.0 * FIELD.log_value(edge)) * inward
 
 
@@ -114,7 +113,7 @@ def stretches_of(path: Array) -> tuple[Array, Array]:
     return middles, np.full(count, length)
 
 
-def cell_average(values_per_axis: int = 6) -> tuple[Array, Array]:
+def cell_average(values_per_axis: int = 6) -> tuple[Array, NDArray[np.bool_]]:
     """Mean ρ of each cell, and whether the cell is compared: clear of obstacles and goal."""
     fine = CELLS * values_per_axis
     ticks = -HALF + (np.arange(fine) + 0.5) * 2.0 * HALF / fine
@@ -123,7 +122,8 @@ def cell_average(values_per_axis: int = 6) -> tuple[Array, Array]:
     rho = np.exp(FIELD.log_value(x))
     clear = smallest_value(FIELD.obstacles, x) > 0.0
     clear &= np.linalg.norm(x - GOAL, axis=-1) > DELTA
-    return rho.reshape(blocks).mean(axis=(1, 3)), clear.reshape(blocks).all(axis=(1, 3))
+    compared = np.asarray(clear.reshape(blocks).all(axis=(1, 3)))
+    return rho.reshape(blocks).mean(axis=(1, 3)), compared
 
 
 def cells_where(condition: Callable[[Array], NDArray[np.bool_]]) -> NDArray[np.bool_]:
@@ -148,17 +148,17 @@ def draw(measured: Array, rho: Array) -> Figure:
     axes = figure.subplots(1, 3)
     titles = ("(a) the navigation problem", "(b) density ρ", "(c) occupancy, measured")
     for ax, title in zip(axes, titles, strict=True):
-        style.plane_axes(ax, EXTENT, title)
-        style.outline_sensing(ax, [region.s for region in FIELD.unsafe], EXTENT)
+        paper.plane_axes(ax, EXTENT, title)
+        paper.outline_sensing(ax, [region.s for region in FIELD.unsafe], EXTENT)
     along = np.linspace(-4.8, 4.8, 13)
     starts = np.concatenate(
         [np.stack([np.full(13, -4.9), along], 1), np.stack([along, np.full(13, 4.9)], 1)]
     )
     curves = integral_curves(FIELD, starts, record=True)
-    style.draw_curves(axes[0], curves.paths, style.outcome_colours(curves.outcome))
+    paper.draw_curves(axes[0], curves.paths, paper.outcome_colours(curves.outcome))
     axes[0].plot(*starts.T, ".", color=style.BLACK, markersize=4, label="starts")
     style.mark_goal(axes[0], GOAL)
-    style.shade_unsafe(axes[0], FIELD.obstacles, EXTENT)
+    paper.shade_unsafe(axes[0], FIELD.obstacles, EXTENT)
     axes[0].legend(loc="lower left")
     for ax, values in zip(axes[1:], (rho, measured), strict=True):
         image = ax.imshow(
@@ -174,7 +174,7 @@ def draw(measured: Array, rho: Array) -> Figure:
 
 
 def main(arguments: list[str] | None = None) -> None:
-    options = figure_arguments(__doc__.splitlines()[0], starts=10_000, arguments=arguments)
+    options = paper.figure_arguments(__doc__.splitlines()[0], starts=10_000, arguments=arguments)
     starts, rate = weighted_starts(options.starts)
     # Deep inside the sensing regions ρ, and with it the rate, is nothing.
     kept = (FIELD.log_value(starts) > -20.0) & (np.linalg.norm(starts - GOAL, axis=1) > DELTA / 2.0)
@@ -182,10 +182,10 @@ def main(arguments: list[str] | None = None) -> None:
     parameters = CurveParameters(reach_radius=DELTA / 2.0)
     curves = integral_curves(FIELD, starts, parameters, record=True)
     measured, (rho, compared) = occupancy(curves, rate), cell_average()
-    style.save_figure(draw(measured, rho), options.out, "fig1_occupancy")
+    paper.save_figure(draw(measured, rho), options.out, "fig1_occupancy")
     sensed = cells_where(lambda x: smallest_value([region.s for region in FIELD.unsafe], x) < 0.0)
     unsafe = cells_where(lambda x: smallest_value(FIELD.obstacles, x) <= 0.0)
-    numbers = {
+    numbers: dict[str, Any] = {
         "starts": len(starts),
         "reached": curves.count(Outcome.REACHED),
         **{
@@ -200,7 +200,7 @@ def main(arguments: list[str] | None = None) -> None:
         "largest_occupancy_in_unsafe_cells_s_per_m2": float(np.abs(measured[unsafe]).max()),
         "delta_m": DELTA,
     }
-    FigureReport(
+    paper.FigureReport(
         "Fig. 1",
         "The time that trajectories of k = ∇ρ spend per area, from starts drawn with density "
         "∇·(ρk), is ρ (to 10 % of its total), and zero in the unsafe sets.",

@@ -1,14 +1,14 @@
 """Fig. 2: the inverse bump Psi around a circle sensed in an ellipse, and a square in an egg."""
 
 import numpy as np
+import paper_figure as paper
 from matplotlib.figure import Figure
 
-from densarm.arrays import Array
-from densarm.density.implicit_function import UnsafeRegion
-from densarm.density.implicit_shapes import Ball, Egg, Ellipsoid, PNormBall
 from densarm.density.inverse_bump import inverse_bump
+from densarm.euclidean.implicit import UnsafeRegion
+from densarm.euclidean.shapes import Ball, Egg, Ellipsoid, PNormBall
+from densarm.values.arrays import Array
 from densarm.visualization import figure_style as style
-from densarm.visualization.figure_report import FigureReport, figure_arguments
 
 THETA = 0.1  # large enough to be seen
 EXTENT = (-3.0, 3.0, -3.0, 3.0)  # [m]
@@ -60,13 +60,14 @@ def is_inverse_bump(numbers: dict[str, float | bool]) -> bool:
 
 def draw() -> Figure:
     figure = style.new_figure(9.0, 7.2)
-    upper, lower = figure.subfigures(2)  # the lower, laid out alone, does not crowd the upper
+    # The lower, laid out alone, does not crowd the upper.
+    upper, lower = figure.subfigures(2, squeeze=False).ravel()
     first, second = style.plane_grid(EXTENT)
     x = np.stack([first, second], axis=-1)
     for column, (name, region) in enumerate(REGIONS.items()):
         psi = bump(region, x)
         ax = upper.add_subplot(1, 2, 1 + column)
-        style.plane_axes(ax, EXTENT, f"({'ab'[column]}) Ψ: {name}")
+        paper.plane_axes(ax, EXTENT, f"({'ab'[column]}) Ψ: {name}")
         levels = np.linspace(THETA - 1e-9, 1.0 + THETA + 1e-9, 21)
         filled = ax.contourf(first, second, psi, levels, cmap=style.DENSITY_MAP)
         upper.colorbar(filled, ax=ax, label="Ψ [–]", shrink=0.85, ticks=[0.1, 0.35, 0.6, 0.85, 1.1])
@@ -85,18 +86,18 @@ def draw() -> Figure:
             linewidth=0.0,
             rasterized=True,
         )
-        style.space_axes(space, (*EXTENT, 0.0, 1.2), f"({'cd'[column]}) the same as a surface")
+        paper.space_axes(space, (*EXTENT, 0.0, 1.2), f"({'cd'[column]}) the same as a surface")
         space.set_box_aspect((1.0, 1.0, 0.55))
         space.set_zlabel("Ψ [–]")
     return figure
 
 
 def main(arguments: list[str] | None = None) -> None:
-    options = figure_arguments(__doc__, starts=0, arguments=arguments)
-    style.save_figure(draw(), options.out, "fig2_inverse_bumps")
+    options = paper.figure_arguments(__doc__, starts=0, arguments=arguments)
+    paper.save_figure(draw(), options.out, "fig2_inverse_bumps")
     x = np.stack(style.plane_grid(EXTENT, 1200), axis=-1).reshape(-1, 2)
     numbers = {name: checks(region, x) for name, region in REGIONS.items()}
-    FigureReport(
+    paper.FigureReport(
         "Fig. 2",
         "Psi is theta on the unsafe set, 1 + theta beyond the sensing region and passes smoothly "
         "between, for a circle sensed in an ellipse and a rounded square sensed in an egg.",

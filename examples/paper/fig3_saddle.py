@@ -1,20 +1,20 @@
 """Fig. 3: almost every start reaches the target; the rest, of measure zero, ends at a saddle."""
 
 import numpy as np
+import paper_figure as paper
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from densarm.density.euclidean_density import EuclideanDensity
-from densarm.density.gauge import Gauge
-from densarm.density.implicit_function import UnsafeRegion
-from densarm.density.implicit_shapes import Ball
-from densarm.density.navigation_density import DensityParameters
-from densarm.fields.critical_point import CriticalKind, CriticalPoint, find_critical_point
-from densarm.fields.integral_curves import IntegralCurves, integral_curves
-from densarm.outcome import Outcome
-from densarm.simulation.proportion import Proportion
+from densarm.density.critical_points import CriticalKind, CriticalPoint, find_critical_point
+from densarm.density.navigation_density import DensityParameters, Gauge
+from densarm.euclidean.density import EuclideanDensity
+from densarm.euclidean.implicit import UnsafeRegion
+from densarm.euclidean.integral_curves import IntegralCurves, integral_curves
+from densarm.euclidean.runs import Proportion
+from densarm.euclidean.shapes import Ball
+from densarm.values.arrays import Array
+from densarm.values.outcome import Outcome
 from densarm.visualization import figure_style as style
-from densarm.visualization.figure_report import FigureReport, figure_arguments
 
 TARGET = np.array([4.0, -3.0])  # [m]
 REGION = UnsafeRegion(h=Ball(radius=2.0), s=Ball(radius=3.0))  # [m]
@@ -28,7 +28,7 @@ def density(theta: float) -> EuclideanDensity:
     return EuclideanDensity([REGION], TARGET, DensityParameters(theta=theta, gauge=Gauge.LOG))
 
 
-def random_starts(count: int) -> np.ndarray:
+def random_starts(count: int) -> Array:
     points = np.random.default_rng(3).uniform(-BOUND, BOUND, (2 * count + 50, 2))
     return points[REGION.h(points) > 0.0][:count]
 
@@ -38,7 +38,8 @@ def critical_points(field: EuclideanDensity) -> list[CriticalPoint]:
     found: list[CriticalPoint] = []
     for angle in np.linspace(0.0, 2.0 * np.pi, 12, endpoint=False):
         for radius in (2.3, 2.6, 2.9):
-            point = find_critical_point(field, radius * np.array([np.cos(angle), np.sin(angle)]))
+            guess = radius * np.array([np.cos(angle), np.sin(angle)])
+            point = find_critical_point(lambda x: field.gradient(x, Gauge.LOG), guess)
             inside = REGION.h(point.position) > 0.0 > REGION.s(point.position)
             fresh = all(np.linalg.norm(point.position - p.position) > 1e-6 for p in found)
             if inside and point.slope < 1e-9 and fresh:
@@ -58,14 +59,14 @@ def draw(field: EuclideanDensity, saddle: CriticalPoint, ray: IntegralCurves) ->
     for ax, title, extent in zip(
         axes, titles, [EXTENT] * 3 + [(-3.4, -1.2, -0.4, 1.8)], strict=True
     ):
-        style.plane_axes(ax, extent, title)
+        paper.plane_axes(ax, extent, title)
         draw_scene(ax, field, extent)
     along = np.linspace(0.0, 1.0, 40)[:, np.newaxis]
     line = np.array([-9.5, 0.0]) + along * np.array([9.0, 9.5])
     curves = integral_curves(field, line, record=True)
-    style.draw_curves(axes[0], curves.paths, style.outcome_colours(curves.outcome))
+    paper.draw_curves(axes[0], curves.paths, paper.outcome_colours(curves.outcome))
     axes[0].plot(*line.T, ".", color=style.BLACK, markersize=3, label="starts")
-    style.draw_curves(axes[1], ray.paths, [style.BLACK] * len(ray.paths), width=1.8)
+    paper.draw_curves(axes[1], ray.paths, [style.BLACK] * len(ray.paths), width=1.8)
     axes[1].plot(*saddle.position, "o", color=style.PURPLE, zorder=6, label="saddle")
     pair = integral_curves(field, np.array([A, B]), record=True)
     for ax in axes[2:]:
@@ -82,25 +83,25 @@ def draw_scene(ax: Axes, field: EuclideanDensity, extent: tuple[float, ...]) -> 
     value = field.log_value(np.stack([first, second], axis=-1))
     levels = np.arange(-12.0, 4.0, 0.5)
     ax.contour(first, second, value, levels, colors=style.SKY, linewidths=0.5, linestyles="-")
-    style.outline_sensing(ax, [REGION.s], extent)
-    style.shade_unsafe(ax, field.obstacles, extent)
+    paper.outline_sensing(ax, [REGION.s], extent)
+    paper.shade_unsafe(ax, field.obstacles, extent)
     style.mark_goal(ax, TARGET)
 
 
 def main(arguments: list[str] | None = None) -> None:
-    options = figure_arguments(__doc__, starts=10_000, arguments=arguments)
+    options = paper.figure_arguments(__doc__, starts=10_000, arguments=arguments)
     field, starts = density(theta=0.0), random_starts(options.starts)
     curves = integral_curves(field, starts)
     found = critical_points(field)
     saddle = found[0]
     on_ray = np.array([2.05, 2.5, 5.0, 8.0, 11.0])[:, np.newaxis] * AWAY
     ray = integral_curves(field, on_ray, record=True)
-    style.save_figure(draw(field, saddle, ray), options.out, "fig3_saddle")
+    paper.save_figure(draw(field, saddle, ray), options.out, "fig3_saddle")
     leaks = {theta: integral_curves(density(theta), starts) for theta in (1e-3, 1e-2, 1e-1)}
     all_reach = curves.count(Outcome.REACHED) == len(starts)
     is_saddle = len(found) == 1 and saddle.kind is CriticalKind.SADDLE and saddle.slope < 1e-6
     off_saddle = np.linalg.norm(ray.end - saddle.position, axis=1).max()
-    FigureReport(
+    paper.FigureReport(
         "Fig. 3",
         "With theta = 0 every random start outside the unsafe set reaches (4, -3) and none enters "
         "it; the starts polar opposite of the target, a set of measure zero, end at a saddle.",

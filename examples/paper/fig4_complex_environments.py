@@ -2,23 +2,27 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+import paper_figure as paper
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from mpl_toolkits.mplot3d import Axes3D
+from numpy.typing import ArrayLike
 
-from densarm.arrays import Array
-from densarm.density.euclidean_density import EuclideanDensity
-from densarm.density.gauge import Gauge
-from densarm.density.implicit_function import (
+from densarm.density.navigation_density import DensityParameters, Gauge
+from densarm.euclidean.density import EuclideanDensity
+from densarm.euclidean.implicit import (
     ImplicitFunction,
     Lowered,
     Placed,
     UnsafeRegion,
     smallest_value,
 )
-from densarm.density.implicit_shapes import (
+from densarm.euclidean.integral_curves import CurveParameters, IntegralCurves, integral_curves
+from densarm.euclidean.runs import Proportion
+from densarm.euclidean.shapes import (
     Ball,
     Bowtie,
     Cylinder,
@@ -27,16 +31,15 @@ from densarm.density.implicit_shapes import (
     PNormBall,
     Torus,
 )
-from densarm.density.navigation_density import DensityParameters
-from densarm.fields.integral_curves import CurveParameters, IntegralCurves, integral_curves
-from densarm.outcome import Outcome
-from densarm.simulation.proportion import Proportion
+from densarm.values.arrays import Array, Vector
+from densarm.values.outcome import Outcome
 from densarm.visualization import figure_style as style
-from densarm.visualization.figure_report import FigureReport, figure_arguments
 
 BAR = 0.999  # of the starts, that must reach the goal
 SHOWN = 48  # curves drawn in each picture
 CURVES = CurveParameters(tolerance=1e-3)  # [m]
+
+Surface = tuple[Array, Array, Array]  # its points, by coordinate [m]
 
 
 @dataclass(frozen=True)
@@ -46,7 +49,7 @@ class Environment:
     goal: tuple[float, ...]  # [m]
     extent: tuple[float, ...]  # [m]
     paper_starts: Callable[[np.random.Generator, int], Array]  # where the paper starts from
-    surfaces: tuple[tuple[Array, Array, Array], ...] = ()  # of the obstacles, in space
+    surfaces: tuple[Surface, ...] = ()  # of the obstacles, in space
 
     def random_starts(self, random: np.random.Generator, count: int) -> Array:
         """Starts uniform in the extent outside the unsafe sets."""
@@ -56,7 +59,10 @@ class Environment:
 
 
 def placed(
-    h: ImplicitFunction, s: ImplicitFunction, position: tuple[float, ...], rotation=None
+    h: ImplicitFunction,
+    s: ImplicitFunction,
+    position: tuple[float, ...],
+    rotation: ArrayLike | None = None,
 ) -> UnsafeRegion:
     return UnsafeRegion(Placed(h, position, rotation), Placed(s, position, rotation))
 
@@ -152,20 +158,22 @@ def angles(first: float, second: float) -> tuple[Array, Array]:
     return u, v
 
 
-def sphere_surface(centre, radius: float) -> tuple[Array, Array, Array]:
+def sphere_surface(centre: Vector, radius: float) -> Surface:
     u, v = angles(2.0 * np.pi, np.pi)
     unit = np.stack([np.cos(u) * np.sin(v), np.sin(u) * np.sin(v), np.cos(v)])
-    return tuple(radius * unit + np.reshape(centre, (3, 1, 1)))
+    x, y, z = radius * unit + np.reshape(centre, (3, 1, 1))
+    return x, y, z
 
 
-def torus_surface(centre, rotation: Array, major: float, minor: float):
+def torus_surface(centre: Vector, rotation: Array, major: float, minor: float) -> Surface:
     u, v = angles(2.0 * np.pi, 2.0 * np.pi)
     ring = major + minor * np.cos(v)
     points = np.stack([ring * np.cos(u), ring * np.sin(u), minor * np.sin(v)])
-    return tuple(np.tensordot(rotation, points, 1) + np.reshape(centre, (3, 1, 1)))
+    x, y, z = np.tensordot(rotation, points, 1) + np.reshape(centre, (3, 1, 1))
+    return x, y, z
 
 
-def cylinder_surface(centre, radius: float, half_height: float):
+def cylinder_surface(centre: Vector, radius: float, half_height: float) -> Surface:
     u, v = angles(2.0 * np.pi, 1.0)
     height = half_height * (2.0 * v - 1.0)
     return centre[0] + radius * np.cos(u), centre[1] + radius * np.sin(u), height
@@ -185,7 +193,7 @@ def follow(environment: Environment, count: int) -> IntegralCurves:
     return integral_curves(field_of(environment), np.concatenate(starts), CURVES, record=True)
 
 
-def rates(curves: IntegralCurves) -> dict[str, dict[str, float]]:
+def rates(curves: IntegralCurves) -> dict[str, dict[str, Any]]:
     count = len(curves.outcome) // 2
     return {
         "starts_as_in_the_paper": summary(curves, slice(None, count)),
@@ -193,7 +201,7 @@ def rates(curves: IntegralCurves) -> dict[str, dict[str, float]]:
     }
 
 
-def summary(curves: IntegralCurves, part: slice) -> dict[str, float]:
+def summary(curves: IntegralCurves, part: slice) -> dict[str, Any]:
     outcome = curves.outcome[part]
     count = {kind: int((outcome == kind).sum()) for kind in Outcome}
     reached = Proportion(count[Outcome.REACHED], len(outcome))
@@ -210,7 +218,8 @@ def summary(curves: IntegralCurves, part: slice) -> dict[str, float]:
 
 def draw(environments: list[Environment], followed: list[IntegralCurves]) -> Figure:
     figure = style.new_figure(10.0, 9.2)
-    halves = figure.subfigures(2)  # axes of space, laid out alone, do not crowd those of the plane
+    # Axes of space, laid out alone, do not crowd those of the plane.
+    halves = figure.subfigures(2, squeeze=False).ravel()
     for number, (environment, curves) in enumerate(zip(environments, followed, strict=True)):
         space = len(environment.goal) == 3
         kind = {"projection": "3d"} if space else {}
@@ -221,7 +230,7 @@ def draw(environments: list[Environment], followed: list[IntegralCurves]) -> Fig
             draw_space(ax, environment, title)
         else:
             draw_plane(ax, environment, title)
-        style.draw_curves(ax, curves.paths[shown], style.outcome_colours(curves.outcome[shown]))
+        paper.draw_curves(ax, curves.paths[shown], paper.outcome_colours(curves.outcome[shown]))
         style.mark_goal(ax, np.array(environment.goal))
         starts = np.array([path[0] for path in curves.paths[shown]])
         ax.plot(*starts.T, ".", color=style.BLACK, markersize=3)
@@ -229,19 +238,19 @@ def draw(environments: list[Environment], followed: list[IntegralCurves]) -> Fig
 
 
 def draw_plane(ax: Axes, environment: Environment, title: str) -> None:
-    style.plane_axes(ax, environment.extent, title)
-    style.outline_sensing(ax, [region.s for region in environment.unsafe], environment.extent)
-    style.shade_unsafe(ax, [region.h for region in environment.unsafe], environment.extent)
+    paper.plane_axes(ax, environment.extent, title)
+    paper.outline_sensing(ax, [region.s for region in environment.unsafe], environment.extent)
+    paper.shade_unsafe(ax, [region.h for region in environment.unsafe], environment.extent)
 
 
 def draw_space(ax: Axes3D, environment: Environment, title: str) -> None:
-    style.space_axes(ax, environment.extent, title)
+    paper.space_axes(ax, environment.extent, title)
     for surface in environment.surfaces:
         ax.plot_surface(*surface, color=style.GREY, alpha=0.35, linewidth=0.0, rasterized=True)
     ax.view_init(elev=28.0, azim=-62.0)
 
 
-def meets_bar(numbers: dict[str, dict[str, float]]) -> bool:
+def meets_bar(numbers: dict[str, dict[str, Any]]) -> bool:
     return all(
         each["reached"] >= BAR * each["starts"] and each["collided"] == 0
         for each in numbers.values()
@@ -249,7 +258,7 @@ def meets_bar(numbers: dict[str, dict[str, float]]) -> bool:
 
 
 def main(arguments: list[str] | None = None) -> None:
-    options = figure_arguments(__doc__, starts=1000, arguments=arguments)
+    options = paper.figure_arguments(__doc__, starts=1000, arguments=arguments)
     convex = Ellipsoid((1.0, 1.35), 2.5)
     environments = [four_shapes(convex), maze(), grid_of_spheres(), tori()]
     followed = [follow(each, options.starts) for each in environments]
@@ -261,8 +270,8 @@ def main(arguments: list[str] | None = None) -> None:
     numbers["(a) with the bowtie sensed in a region that follows its notches"] = rates(
         follow(notched, max(1, options.starts // 5))
     )
-    style.save_figure(draw(environments, followed), options.out, "fig4_complex_environments")
-    FigureReport(
+    paper.save_figure(draw(environments, followed), options.out, "fig4_complex_environments")
+    paper.FigureReport(
         "Fig. 4",
         "In four complex environments at least 99.9 % of the starts reach the goal and none "
         "collides, with sensing regions that are convex and curved enough.",

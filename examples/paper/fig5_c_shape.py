@@ -1,22 +1,21 @@
 """Fig. 5: out of a C-shaped unsafe set, density functions against navigation functions."""
 
+from typing import Any
+
 import numpy as np
+import paper_figure as paper
 from matplotlib.figure import Figure
 
-from densarm.arrays import Array
-from densarm.density.euclidean_density import EuclideanDensity
-from densarm.density.gauge import Gauge
-from densarm.density.implicit_function import Complement, UnsafeRegion
-from densarm.density.implicit_shapes import Ball, CShape, Egg
-from densarm.density.navigation_density import DensityParameters
-from densarm.fields.integral_curves import integral_curves
-from densarm.fields.navigation_field import NavigationField
-from densarm.fields.navigation_function import NavigationFunction
-from densarm.fields.potential_field import PotentialField
-from densarm.outcome import Outcome
-from densarm.simulation.proportion import Proportion
+from densarm.density.navigation_density import DensityParameters, Gauge
+from densarm.euclidean.density import EuclideanDensity
+from densarm.euclidean.fields import NavigationField, NavigationFunction, PotentialField
+from densarm.euclidean.implicit import Complement, UnsafeRegion
+from densarm.euclidean.integral_curves import integral_curves
+from densarm.euclidean.runs import Proportion
+from densarm.euclidean.shapes import Ball, CShape, Egg
+from densarm.values.arrays import Array
+from densarm.values.outcome import Outcome
 from densarm.visualization import figure_style as style
-from densarm.visualization.figure_report import FigureReport, figure_arguments
 
 GOAL = np.array([-9.0, 1.0])  # behind the closed side of the C [m]
 C_SHAPE = CShape(radius=2.2, half_width=0.4, opening=0.0, sharpness=2.0)
@@ -53,10 +52,11 @@ def cavity_starts(shape: CShape, count: int) -> Array:
     """Random starts inside the C: in its ring, short of its opening, off the unsafe set."""
     points = np.random.default_rng(5).uniform(-shape.radius, shape.radius, (8 * count + 50, 2))
     inside = (np.linalg.norm(points, axis=1) < shape.radius) & (points[:, 0] < shape.opening)
-    return points[inside & (shape(points) > 0.0)][:count]
+    starts: Array = points[inside & (shape(points) > 0.0)][:count]
+    return starts
 
 
-def rates(field: NavigationField, count: int) -> dict[str, object]:
+def rates(field: NavigationField, count: int) -> dict[str, Any]:
     shape = next(h for h in field.obstacles if isinstance(h, CShape))
     curves = integral_curves(field, cavity_starts(shape, count))
     reached = Proportion(curves.count(Outcome.REACHED), count)
@@ -77,17 +77,17 @@ def covered_share(radius: float) -> float:
     return float(sensed[C_SHAPE(x) <= 0.0].mean())
 
 
-def draw(numbers: dict[str, dict[str, object]], starts: int) -> Figure:
+def draw(numbers: dict[str, dict[str, Any]], starts: int) -> Figure:
     figure = style.new_figure(9.0, 7.2)
     axes = figure.subplots(2, 2).ravel()
     for letter, ax, (name, field) in zip("abcd", axes, FIELDS.items(), strict=True):
         curves = integral_curves(field, cavity_starts(C_SHAPE, SHOWN), record=True)
-        reached = Proportion(int(str(numbers[name]["reached"])), starts)
-        style.plane_axes(ax, EXTENT, f"({letter}) {name}: {100 * reached.rate:.1f} % reach")
+        reached = Proportion(numbers[name]["reached"], starts)
+        paper.plane_axes(ax, EXTENT, f"({letter}) {name}: {100 * reached.rate:.1f} % reach")
         if isinstance(field, EuclideanDensity):
-            style.outline_sensing(ax, [field.unsafe[0].s], EXTENT)
-        style.shade_unsafe(ax, [C_SHAPE], EXTENT)
-        style.draw_curves(ax, curves.paths, style.outcome_colours(curves.outcome))
+            paper.outline_sensing(ax, [field.unsafe[0].s], EXTENT)
+        paper.shade_unsafe(ax, [C_SHAPE], EXTENT)
+        paper.draw_curves(ax, curves.paths, paper.outcome_colours(curves.outcome))
         starts_shown = np.array([path[0] for path in curves.paths])
         ax.plot(*starts_shown.T, ".", color=style.BLACK, markersize=3, zorder=5, label="starts")
         for outcome in sorted(set(curves.outcome)):
@@ -101,12 +101,12 @@ def draw(numbers: dict[str, dict[str, object]], starts: int) -> Figure:
 
 
 def main(arguments: list[str] | None = None) -> None:
-    options = figure_arguments(__doc__, starts=1000, arguments=arguments)
+    options = paper.figure_arguments(__doc__, starts=1000, arguments=arguments)
     numbers = {name: rates(field, options.starts) for name, field in {**FIELDS, **BEYOND}.items()}
-    style.save_figure(draw(numbers, options.starts), options.out, "fig5_c_shape")
+    paper.save_figure(draw(numbers, options.starts), options.out, "fig5_c_shape")
     reached = {name: numbers[name]["reached"] for name in FIELDS}
     enclosing = reached.pop("density, r = 4.5")
-    FigureReport(
+    paper.FigureReport(
         "Fig. 5",
         "From random starts inside a C-shaped unsafe set the density whose sensing region encloses "
         "it (r = 4.5) reaches the goal always; with r = 2.5, and by navigation functions with "

@@ -1,21 +1,19 @@
 """Fig. 6: the gradient of the density as control, bounded to u_max in the maximum norm."""
 
 import numpy as np
+import paper_figure as paper
 from matplotlib.figure import Figure
 
-from densarm.arrays import Array
-from densarm.configuration_space import EuclideanSpace
-from densarm.density.euclidean_density import EuclideanDensity
-from densarm.density.gauge import Gauge
-from densarm.density.implicit_function import Placed, UnsafeRegion, smallest_value
-from densarm.density.implicit_shapes import Ball
-from densarm.density.navigation_density import DensityParameters
-from densarm.outcome import Outcome
-from densarm.simulation.point_runs import PointRuns, run_points
-from densarm.simulation.proportion import Proportion
-from densarm.simulation.single_integrator import SingleIntegrator
+from densarm.arms.joint_space import EuclideanSpace
+from densarm.density.navigation_density import DensityParameters, Gauge
+from densarm.euclidean.density import EuclideanDensity
+from densarm.euclidean.implicit import Placed, UnsafeRegion, smallest_value
+from densarm.euclidean.runs import PointRuns, Proportion, run_points
+from densarm.euclidean.shapes import Ball
+from densarm.simulation.plants import SingleIntegrator
+from densarm.values.arrays import Array
+from densarm.values.outcome import Outcome
 from densarm.visualization import figure_style as style
-from densarm.visualization.figure_report import FigureReport, figure_arguments
 
 U_MAX = 0.2  # [m/s]
 GAIN = 5.0  # factor of the gradient of the density, whose own speed far away is a few cm/s
@@ -41,11 +39,11 @@ def random_starts(count: int) -> Array:
 def draw(runs: PointRuns, starts: Array) -> Figure:
     figure = style.new_figure(10.0, 4.8)
     plane, traces = figure.subplots(1, 2, width_ratios=[1.0, 1.15])
-    style.plane_axes(plane, EXTENT, "(a) paths under bounded control")
-    style.outline_sensing(plane, [region.s for region in FIELD.unsafe], EXTENT)
-    style.shade_unsafe(plane, FIELD.obstacles, EXTENT)
+    paper.plane_axes(plane, EXTENT, "(a) paths under bounded control")
+    paper.outline_sensing(plane, [region.s for region in FIELD.unsafe], EXTENT)
+    paper.shade_unsafe(plane, FIELD.obstacles, EXTENT)
     paths = [runs.x[:, i] for i in range(min(SHOWN, len(starts)))]
-    style.draw_curves(plane, paths, style.outcome_colours(runs.outcome[: len(paths)]), width=1.0)
+    paper.draw_curves(plane, paths, paper.outcome_colours(runs.outcome[: len(paths)]), width=1.0)
     plane.plot(*starts[: len(paths)].T, ".", color=style.BLACK, markersize=4, label="starts")
     style.mark_goal(plane, GOAL)
     plane.legend(loc="lower right")
@@ -70,18 +68,18 @@ def draw(runs: PointRuns, starts: Array) -> Figure:
 
 
 def main(arguments: list[str] | None = None) -> None:
-    options = figure_arguments(__doc__, starts=1000, arguments=arguments)
+    options = paper.figure_arguments(__doc__, starts=1000, arguments=arguments)
     starts = random_starts(options.starts)
     plant = SingleIntegrator(EuclideanSpace(2), DT)
     runs, plain = (
-        run_points(FIELD, plant, starts, U_MAX, TIME_LIMIT, REACH_RADIUS, gain)
+        run_points(lambda _: FIELD, plant, starts, U_MAX, TIME_LIMIT, REACH_RADIUS, gain)
         for gain in (GAIN, 1.0)
     )
-    style.save_figure(draw(runs, starts), options.out, "fig6_bounded_control")
+    paper.save_figure(draw(runs, starts), options.out, "fig6_bounded_control")
     reached = Proportion(runs.count(Outcome.REACHED), len(starts))
     largest = float(np.abs(runs.u).max())
     at_bound = np.abs(runs.u).max(axis=-1) > U_MAX * (1.0 - 1e-9)
-    FigureReport(
+    paper.FigureReport(
         "Fig. 6",
         f"Bounded to u_max = {U_MAX} m/s the control {GAIN:g} ∇ρ stays within the bound, and every "
         "start outside the sensing regions reaches the goal without entering the unsafe set.",

@@ -1,23 +1,22 @@
 """Fig. 7: bounded control by the density with Gaussian noise on the control."""
 
 from itertools import product
+from typing import Any
 
 import numpy as np
+import paper_figure as paper
 from matplotlib.figure import Figure
 
-from densarm.arrays import Array
-from densarm.configuration_space import EuclideanSpace
-from densarm.density.euclidean_density import EuclideanDensity
-from densarm.density.gauge import Gauge
-from densarm.density.implicit_function import Placed, UnsafeRegion, smallest_value
-from densarm.density.implicit_shapes import Ball
-from densarm.density.navigation_density import DensityParameters
-from densarm.outcome import Outcome
-from densarm.simulation.point_runs import PointRuns, run_points
-from densarm.simulation.proportion import Proportion
-from densarm.simulation.single_integrator import NoiseScaling, SingleIntegrator
+from densarm.arms.joint_space import EuclideanSpace
+from densarm.density.navigation_density import DensityParameters, Gauge
+from densarm.euclidean.density import EuclideanDensity
+from densarm.euclidean.implicit import Placed, UnsafeRegion, smallest_value
+from densarm.euclidean.runs import PointRuns, Proportion, run_points
+from densarm.euclidean.shapes import Ball
+from densarm.simulation.plants import NoiseScaling, SingleIntegrator
+from densarm.values.arrays import Array
+from densarm.values.outcome import Outcome
 from densarm.visualization import figure_style as style
-from densarm.visualization.figure_report import FigureReport, figure_arguments
 
 BEYOND = (2e-2, 1e-1)  # larger than in the paper, white: where the noise wins [m²/s]
 VARIANCES = (1e-3, 5e-3)  # Σ: [m²/s] where noise is white, [m²/s²] where it is held
@@ -47,7 +46,8 @@ def random_starts(count: int) -> Array:
 
 def run(gauge: Gauge, scaling: NoiseScaling, variance: float, starts: Array) -> PointRuns:
     plant = SingleIntegrator(EuclideanSpace(2), DT, variance, scaling, seed=7)
-    return run_points(field(gauge), plant, starts, U_MAX, TIME_LIMIT, REACH_RADIUS, GAIN)
+    density = field(gauge)
+    return run_points(lambda _: density, plant, starts, U_MAX, TIME_LIMIT, REACH_RADIUS, GAIN)
 
 
 def summary(runs: PointRuns) -> dict[str, object]:
@@ -67,12 +67,12 @@ def draw(shown: dict[tuple[Gauge, float], PointRuns]) -> Figure:
     ):
         reached = Proportion(runs.count(Outcome.REACHED), len(runs.outcome))
         title = f"({'abcd'[number]}) {gauge} gauge, Σ = {variance:g} m²/s:\n{reached} reach"
-        style.plane_axes(ax, EXTENT, title)
-        style.outline_sensing(ax, [region.s for region in field(gauge).unsafe], EXTENT)
-        style.shade_unsafe(ax, field(gauge).obstacles, EXTENT)
+        paper.plane_axes(ax, EXTENT, title)
+        paper.outline_sensing(ax, [region.s for region in field(gauge).unsafe], EXTENT)
+        paper.shade_unsafe(ax, field(gauge).obstacles, EXTENT)
         count = min(SHOWN, len(runs.outcome))
         paths = [runs.x[:, i] for i in range(count)]
-        style.draw_curves(ax, paths, style.outcome_colours(runs.outcome[:count]))
+        paper.draw_curves(ax, paths, paper.outcome_colours(runs.outcome[:count]))
         ax.plot(*runs.x[0, :count].T, ".", color=style.BLACK, markersize=4, label="starts")
         for outcome in (Outcome.REACHED, Outcome.COLLIDED, Outcome.TIMED_OUT):
             if (runs.outcome[:count] == outcome).any():
@@ -83,9 +83,10 @@ def draw(shown: dict[tuple[Gauge, float], PointRuns]) -> Figure:
 
 
 def main(arguments: list[str] | None = None) -> None:
-    options = figure_arguments(__doc__, starts=1000, arguments=arguments)
+    options = paper.figure_arguments(__doc__, starts=1000, arguments=arguments)
     starts = random_starts(options.starts)
-    numbers, shown = {}, {}
+    numbers: dict[str, dict[str, Any]] = {}
+    shown: dict[tuple[Gauge, float], PointRuns] = {}
     for gauge, scaling, variance in product((Gauge.DENSITY, Gauge.LOG), NoiseScaling, VARIANCES):
         runs = run(gauge, scaling, variance, starts)
         numbers[f"{gauge} gauge, {scaling} noise, variance {variance:g}"] = summary(runs)
@@ -97,10 +98,10 @@ def main(arguments: list[str] | None = None) -> None:
         )
         for gauge, variance in product((Gauge.DENSITY, Gauge.LOG), BEYOND)
     }
-    style.save_figure(draw(shown), options.out, "fig7_control_noise")
+    paper.save_figure(draw(shown), options.out, "fig7_control_noise")
     collided = [each["collided"] for each in numbers.values()]
     reached = [each["reached"] for each in numbers.values()]
-    FigureReport(
+    paper.FigureReport(
         "Fig. 7",
         "With Gaussian noise of variance 1e-3 and 5e-3 on the control every run reaches the goal "
         "and none enters the unsafe set, however the noise is scaled and in both gauges.",

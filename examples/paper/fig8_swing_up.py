@@ -4,40 +4,38 @@ from dataclasses import dataclass
 from functools import cache, partial
 
 import numpy as np
+import paper_figure as paper
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle
+from numpy.typing import NDArray
 
 import densarm
-from densarm.arrays import Array
 from densarm.certificates.certificate import swept_result
-from densarm.control.density_tracking import DensityTracking
-from densarm.control.gains import Gains
-from densarm.density import (
-    ClearanceSet,
-    GoalDistance,
-    NavigationDensity,
-    ProductDistance,
-    TorusDistance,
-)
-from densarm.density.joint_space_cover import JointSpaceCover
-from densarm.density.rim_traps import rim, rim_traps
-from densarm.density.unsafe_set import UnsafeSet
-from densarm.fields.integral_curves import CurveParameters, IntegralCurves, integral_curves
-from densarm.fields.joint_space_field import JointSpaceField, SmallestClearance
-from densarm.outcome import Outcome
-from densarm.proof.swept_bound import SweptBound
-from densarm.proof.swept_check import SweptVerdict
-from densarm.reference.smooth_path import smooth_path
-from densarm.reference.timing import time_path
-from densarm.reference.timing_parameters import TimingParameters
-from densarm.simulation import LoopEnd, Recording
-from densarm.simulation.proportion import Proportion
+from densarm.certificates.task import SimulationParameters
+from densarm.control.controller import Gains
+from densarm.control.tracking import DensityTracking
+from densarm.density.goal_distance import GoalDistance, ProductDistance, TorusDistance
+from densarm.density.joint_space_cover import Ellipsoid, JointSpaceCover
+from densarm.density.navigation_density import NavigationDensity
+from densarm.density.unsafe_sets import ClearanceSet, UnsafeSet
+from densarm.euclidean.fields import JointSpaceField, SmallestClearance
+from densarm.euclidean.integral_curves import CurveParameters, IntegralCurves, integral_curves
+from densarm.euclidean.runs import Proportion
+from densarm.planning.motion import TimingParameters
+from densarm.planning.smoothing import smooth_path
+from densarm.planning.timing import time_path
+from densarm.simulation.run import Run
+from densarm.simulation.simulate import simulate
+from densarm.values.arrays import Array
+from densarm.values.outcome import Outcome
 from densarm.visualization import figure_style as style
-from densarm.visualization.figure_report import FigureReport, figure_arguments
+from densarm.world.swept_check import SweptVerdict
+from densarm.world.world import World
 
 START = (0.01, 0.01)  # [rad]; at (0, 0) itself every density here has a critical point
 GAINS = Gains(position=1.0, velocity=10.0)  # the paper's
+SIMULATION = SimulationParameters(stall_time=30.0)  # the law decays at K_p/K_v = 0.1/s
 BY_TORQUE = 20  # of the random starts are also run by torque
 COMPARED = 200  # at most so many starts under each of the other densities
 SIGMA = 0.1  # sensing distance where clearance alone makes the bump [m]
@@ -47,15 +45,18 @@ SNAPSHOTS = 9
 scenario = densarm.load_scenario("swing_up")
 arm = scenario.arm
 goal = arm.postures["upright"]
-clearance = densarm.Clearance(arm, scenario.scene)
-bound = SweptBound(clearance)
-nearest = SmallestClearance(clearance)
+world = World(arm, scenario.scene)
+nearest = SmallestClearance(world)
 inertia = arm.mass_matrix(goal).diagonal()
 inertia_weights = np.asarray(inertia / inertia.min())
 
 
 def sum_distance(weights: Array) -> TorusDistance:
-    return TorusDistance(arm, goal, weights, kappa=np.inf)
+    return TorusDistance(arm, weights, kappa=np.inf)
+
+
+def density(unsafe: UnsafeSet, distance: GoalDistance) -> NavigationDensity:
+    return NavigationDensity(arm, goal, [unsafe], distance)
 
 
 @dataclass(frozen=True)
@@ -67,7 +68,7 @@ class Basin:
     curves: IntegralCurves
 
     @property
-    def reached(self) -> Array:
+    def reached(self) -> NDArray[np.bool_]:
         """Whether each curve ended at the goal or at an image of it, a turn away (N,)."""
         error = arm.difference(arm.configurations(self.curves.end), goal)
         return np.asarray(np.linalg.norm(error, axis=1) <= 1.1 * CURVES.reach_radius)
@@ -88,12 +89,42 @@ class Basin:
 
 
 def basin(distance: GoalDistance, unsafe: UnsafeSet, starts: Array, record: bool = False) -> Basin:
-    field = JointSpaceField(arm, NavigationDensity([unsafe], distance), clearance)
+    field = JointSpaceField(world, density(unsafe, distance))
     return Basin(starts, integral_curves(field, starts, CURVES, record))
 
 
+def rim(ellipse: Ellipsoid, count: int) -> Array:
+    """Points (count, 2) around an ellipse, in order [rad]."""
+    turn = np.linspace(0.0, 2.0 * np.pi, count, endpoint=False)
+    squares, directions = np.linalg.eigh(ellipse.shape)
+    circle = np.column_stack([np.cos(turn), np.sin(turn)])
+    return np.asarray(ellipse.centre + circle * np.sqrt(squares) @ directions.T)
+
+
+def rim_traps(
+    ellipse: Ellipsoid, distance: GoalDistance, towards: Array, count: int = 2000
+) -> Array:
+    """Points (T, 2) of a rim at which V presses inwards and is smallest along the rim [rad].
+
+    ∇V·n > 0 there, n the outward normal, and V has a local minimum on the rim. Level sets of Ψ near
+    the rim follow it: at such a point the density has a spurious maximum close by, since neither
+    along the rim nor across it does anything lead on. Where there is none, what V presses against
+    the rim slides along it and leaves. It is what "convex and curved enough" [ZNV Remark 1] asks
+    for, against the level sets of V.
+    """
+    points = rim(ellipse, count)
+    configurations, slope = arm.configurations(points), np.zeros(2)
+    value = np.array([distance.evaluate(q, towards, slope) for q in configurations])
+    traps = []
+    for k in np.flatnonzero((value < np.roll(value, 1)) & (value < np.roll(value, -1))):
+        distance.evaluate(configurations[k], towards, slope)
+        if slope @ np.linalg.solve(ellipse.shape, points[k] - ellipse.centre) > 0.0:
+            traps.append(points[k])
+    return np.reshape(traps, (-1, 2))
+
+
 def traps_on_rims(cover: JointSpaceCover, distance: GoalDistance) -> int:
-    return sum(len(rim_traps(arm, region.ellipsoid, distance)) for region in cover.regions)
+    return sum(len(rim_traps(region, distance, goal)) for region in cover.regions)
 
 
 def random_starts(count: int) -> Array:
@@ -103,28 +134,29 @@ def random_starts(count: int) -> Array:
     return points[nearest(points) > 0.0][:count]
 
 
-def run_by_torque(unsafe: UnsafeSet, path: Array) -> Recording:
+def run_by_torque(unsafe: UnsafeSet, path: Array) -> Run:
     """Track the timed planning system's curve, joint positions (M, 2), by [ZNV] eq. 17."""
     configurations = arm.configurations(path)
     length = float(np.linalg.norm(np.diff(path, axis=0), axis=1).sum())
-    simulation = densarm.SimulationParameters(stall_time=30.0)  # the law decays at K_p/K_v = 0.1/s
-    smooth = smooth_path(bound, configurations)
+    smooth = smooth_path(world, 0.0, configurations)
     assert smooth is not None
-    reference = time_path(arm, smooth, length, simulation.control_period, TimingParameters())
-    density = NavigationDensity([unsafe], sum_distance(inertia_weights))
-    controller = DensityTracking(arm, density, reference, GAINS)
-    plant = densarm.PinocchioPlant(arm, simulation.dt, simulation.integrator)
-    return densarm.FixedStepLoop(arm, plant, simulation).run(
-        controller, configurations[0], goal, not_before=reference.duration
+    motion = time_path(arm, smooth, length, SIMULATION.control_period, TimingParameters())
+    controller = DensityTracking(
+        world,
+        motion,
+        gains=GAINS,
+        goal_distance=sum_distance(inertia_weights),
+        unsafe_sets=[unsafe],
     )
+    return simulate(world, controller, configurations[0], goal, parameters=SIMULATION)
 
 
-def is_proved_clear(run: Recording) -> bool:
+def is_proved_clear(run: Run) -> bool:
     """Whether the swept check proves that nothing was touched between samples either."""
-    return swept_result(bound, run.q, run.v, run.time[1]).verdict == SweptVerdict.CLEAR
+    return swept_result(world, run.q, run.v, run.time[1]).verdict == SweptVerdict.CLEAR
 
 
-def draw_motion(ax: Axes, run: Recording) -> None:
+def draw_motion(ax: Axes, run: Run) -> None:
     ends = [np.zeros((len(run.q), 2))]
     for angle in np.cumsum(arm.angles(run.q), axis=1).T:
         ends.append(ends[-1] + np.column_stack([np.sin(angle), -np.cos(angle)]))
@@ -135,20 +167,21 @@ def draw_motion(ax: Axes, run: Recording) -> None:
     for order, k in enumerate(at):
         shade = 0.15 + 0.85 * order / (SNAPSHOTS - 1)
         ax.plot(*links[k].T, color=style.VERMILION, alpha=shade, linewidth=3.0, marker="o", ms=4.0)
-        beside = links[k, -1] + 0.2 * (links[k, -1] - links[k, 1])
-        ax.text(*beside, f"{run.time[k]:.1f} s", fontsize=7, ha="center", va="center")
+        x, z = links[k, -1] + 0.2 * (links[k, -1] - links[k, 1])
+        ax.text(x, z, f"{run.time[k]:.1f} s", fontsize=7, ha="center", va="center")
     for ball in scenario.scene:
+        assert isinstance(ball, densarm.Sphere)
         ax.add_patch(Circle((ball.position[0], ball.position[2]), ball.radius, color=style.GREY))
-    style.plane_axes(ax, (-2.4, 2.4, -2.4, 2.4), "(a) the swing-up, by torque")
+    paper.plane_axes(ax, (-2.4, 2.4, -2.4, 2.4), "(a) the swing-up, by torque")
     ax.set(xlabel="$x$ [m]", ylabel="$z$ [m]")
     ax.plot(0.0, 2.0, "*", color=style.GREEN, markersize=12, markeredgecolor=style.BLACK)
 
 
-def draw_traces(axes: list[Axes], run: Recording) -> None:
+def draw_traces(axes: list[Axes], run: Run) -> None:
     rows = (
         (np.unwrap(arm.angles(run.q), axis=0), np.array([np.inf, np.inf]), "$q$ [rad]"),
         (run.v, arm.limits.velocity, "$\\dot q$ [rad/s]"),
-        (run.u, arm.limits.effort, "$u$ [N·m]"),
+        (run.tau, arm.limits.effort, "$u$ [N·m]"),
     )
     for ax, (values, limit, label) in zip(axes, rows, strict=True):
         for j, colour in enumerate((style.BLUE, style.VERMILION)):
@@ -177,10 +210,10 @@ def draw_joint_space(ax: Axes, cover: JointSpaceCover, title: str, beyond: float
     ax.contourf(first, second, h, levels=[-np.inf, 0.0], colors=[style.GREY], zorder=2)
     ax.contour(first, second, h, levels=[0.0], colors=[style.BLACK], linewidths=0.8, zorder=2)
     for region in cover.regions:
-        x, y = rim(region.ellipsoid, 200).T
+        x, y = rim(region, 200).T
         for image in (-2.0 * np.pi, 0.0, 2.0 * np.pi):
             ax.plot(x + image, y, color=style.BLACK, linewidth=0.8, linestyle="--", zorder=2)
-    style.plane_axes(ax, extent, title)
+    paper.plane_axes(ax, extent, title)
     ax.set(xlabel="$q_1$ [rad]", ylabel="$q_2$ [rad]")
     for image in (-np.pi, np.pi):
         style.mark_goal(ax, np.array([image, 0.0]))
@@ -188,15 +221,14 @@ def draw_joint_space(ax: Axes, cover: JointSpaceCover, title: str, beyond: float
 
 def draw_density(ax: Axes, cover: JointSpaceCover, path: Array) -> None:
     draw_joint_space(ax, cover, "(d) unsafe set by coal, sensing regions (dashed), ln ρ", 0.5)
-    density = NavigationDensity([cover], sum_distance(inertia_weights))
-    field = JointSpaceField(arm, density, clearance)
+    field = JointSpaceField(world, density(cover, sum_distance(inertia_weights)))
     first, second = style.plane_grid((-np.pi - 0.5, np.pi + 0.5, -np.pi, np.pi), 150)
     value = field.height(np.stack([first, second], axis=-1))
     levels = np.arange(-5.0, 1.0, 0.15)
     ax.contour(first, second, value, levels, colors=style.SKY, linewidths=0.6, linestyles="-")
     ax.plot(*path.T, color=style.VERMILION, linewidth=1.8, zorder=5, label="planning system")
     ax.plot(*path[0], "o", color=style.VERMILION, markersize=5, zorder=6, label="start")
-    style.legend_once(ax, "lower left")
+    paper.legend_once(ax, "lower left")
 
 
 def draw_basin(ax: Axes, cover: JointSpaceCover, shown: Basin, title: str) -> None:
@@ -209,10 +241,10 @@ def draw_basin(ax: Axes, cover: JointSpaceCover, shown: Basin, title: str) -> No
     ):
         if len(points):
             ax.plot(*points.T, mark, color=colour, markersize=size, zorder=3, label=name)
-    style.legend_once(ax, "upper right")
+    paper.legend_once(ax, "upper right")
 
 
-def draw_runs(ax: Axes, runs: list[Recording]) -> None:
+def draw_runs(ax: Axes, runs: list[Run]) -> None:
     for run in runs:
         angles = arm.angles(run.q)
         breaks = np.abs(np.diff(angles, axis=0)).max(axis=1) > np.pi
@@ -222,7 +254,7 @@ def draw_runs(ax: Axes, runs: list[Recording]) -> None:
 
 
 def draw(
-    cover: JointSpaceCover, path: Array, run: Recording, runs: list[Recording], maps: list[Basin]
+    cover: JointSpaceCover, path: Array, run: Run, runs: list[Run], maps: list[Basin]
 ) -> Figure:
     figure = style.new_figure(13.5, 9.0)
     axes = figure.subplot_mosaic([["a", [["b"], ["v"], ["c"]], "d"], ["e", "f", "g"]])
@@ -237,8 +269,8 @@ def draw(
 
 
 def main(arguments: list[str] | None = None) -> None:
-    options = figure_arguments(__doc__, starts=1000, arguments=arguments)
-    cover = JointSpaceCover(bound)
+    options = paper.figure_arguments(__doc__, starts=1000, arguments=arguments)
+    cover = JointSpaceCover(world)
     starts = random_starts(options.starts)
     weighted, equal = sum_distance(inertia_weights), sum_distance(np.ones(arm.nv))
     swing = basin(weighted, cover, np.array([START]), record=True)
@@ -247,15 +279,15 @@ def main(arguments: list[str] | None = None) -> None:
     tracked = np.flatnonzero(shown.reached[:BY_TORQUE])
     runs = [run_by_torque(cover, shown.curves.paths[k]) for k in tracked]
     few = partial(basin, starts=np.vstack([[START], starts[:COMPARED]]))
-    others = [few(equal, cover), few(ProductDistance(arm, goal), cover)]
+    others = [few(equal, cover), few(ProductDistance(arm), cover)]
     figure = draw(cover, swing.curves.paths[0], run, runs, [shown, *others])
-    style.save_figure(figure, options.out, "fig8_swing_up")
+    paper.save_figure(figure, options.out, "fig8_swing_up")
     clear = [float(nearest(arm.angles(each.q)).min()) for each in (run, *runs)]
     proved = [is_proved_clear(each) for each in (run, *runs)]
-    held = [each.end is LoopEnd.REACHED for each in (run, *runs)]
-    ratio = max(float((np.abs(each.u) / arm.limits.effort).max()) for each in (run, *runs))
-    bump = ClearanceSet(clearance, 0.0, SIGMA)
-    FigureReport(
+    held = [each.outcome is Outcome.REACHED for each in (run, *runs)]
+    ratio = max(float((np.abs(each.tau) / arm.limits.effort).max()) for each in (run, *runs))
+    bump = ClearanceSet(world, 0.0, SIGMA)
+    paper.FigureReport(
         "Fig. 8",
         "With obstacles mapped to joint space by coal and sensed in convex regions the density "
         "alone, without a planner, swings the arm up from (0.01, 0.01) by K_p = 1, K_v = 10 "
@@ -285,7 +317,7 @@ def main(arguments: list[str] | None = None) -> None:
             "weights_of_V": inertia_weights.tolist(),
             "traps_on_rims_inertia_weights": traps_on_rims(cover, weighted),
             "traps_on_rims_equal_weights": traps_on_rims(cover, equal),
-            "sensing_semi_axes_rad": [r.ellipsoid.semi_axes.tolist() for r in cover.regions],
+            "sensing_semi_axes_rad": [region.semi_axes.tolist() for region in cover.regions],
             "other_densities": {
                 "cover, sum with equal weights": others[0].summary,
                 "cover, the paper's product": others[1].summary,

@@ -55,7 +55,8 @@ def section(script: Path, pictures: Path) -> str:
 
 def scripts() -> list[Path]:
     """Scripts of the paper's figures, in their order, then those beyond it."""
-    found = sorted(path for path in FOLDER.glob("*.py") if path != Path(__file__).resolve())
+    others = {Path(__file__).stem, "paper_figure"}
+    found = sorted(path for path in FOLDER.glob("*.py") if path.stem not in others)
     return sorted(found, key=lambda path: not path.stem.startswith("fig"))
 
 

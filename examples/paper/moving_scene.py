@@ -3,23 +3,20 @@
 from typing import Any
 
 import numpy as np
+import paper_figure as paper
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from scipy.integrate import solve_ivp
 
-from densarm.arrays import Array
-from densarm.configuration_space import EuclideanSpace
-from densarm.density.gauge import Gauge
-from densarm.density.implicit_function import UnsafeRegion, smallest_value
-from densarm.density.implicit_shapes import Ball
-from densarm.density.navigation_density import DensityParameters
-from densarm.fields.motion import EllipticMotion
-from densarm.fields.moving_density import MovingDensity, MovingRegion
-from densarm.simulation.proportion import Proportion
-from densarm.simulation.single_integrator import SingleIntegrator
-from densarm.simulation.tracking_runs import TrackingRuns, track_points
+from densarm.arms.joint_space import EuclideanSpace
+from densarm.density.navigation_density import DensityParameters, Gauge
+from densarm.euclidean.implicit import UnsafeRegion, smallest_value
+from densarm.euclidean.moving import EllipticMotion, MovingDensity, MovingRegion
+from densarm.euclidean.runs import PointRuns, Proportion, run_points
+from densarm.euclidean.shapes import Ball
+from densarm.simulation.plants import SingleIntegrator
+from densarm.values.arrays import Array
 from densarm.visualization import figure_style as style
-from densarm.visualization.figure_report import FigureReport, figure_arguments
 
 U_MAX = 1.0  # [m/s]
 GAIN = 2.0
@@ -55,7 +52,7 @@ def distance(h: Array) -> Array:
     return np.sqrt(h + RADIUS**2) - RADIUS
 
 
-def summary(runs: TrackingRuns) -> dict[str, Any]:
+def summary(runs: PointRuns) -> dict[str, Any]:
     entered = Proportion(int(runs.entered.sum()), len(runs.entered))
     error = runs.error[:, ~runs.entered]
     return {
@@ -89,7 +86,7 @@ def continuous(speed: float, starts: Array) -> dict[str, Array]:
     }
 
 
-def draw(runs: dict[float, TrackingRuns], free: dict[str, Array]) -> Figure:
+def draw(runs: dict[float, PointRuns], free: dict[str, Array]) -> Figure:
     figure = style.new_figure(13.0, 4.3)
     plane, errors, rates = figure.subplots(1, 3)
     draw_plane(plane, runs[0.5])
@@ -113,13 +110,13 @@ def draw(runs: dict[float, TrackingRuns], free: dict[str, Array]) -> Figure:
     return figure
 
 
-def draw_plane(ax: Axes, runs: TrackingRuns) -> None:
+def draw_plane(ax: Axes, runs: PointRuns) -> None:
     extent = (-HALF, HALF, -HALF, HALF)
-    style.plane_axes(ax, extent, f"(a) the first {SNAPSHOT:g} s, obstacles at 0.5 m/s")
+    paper.plane_axes(ax, extent, f"(a) the first {SNAPSHOT:g} s, obstacles at 0.5 m/s")
     field = scene(0.5)
     snapshot = field.at(SNAPSHOT)
-    style.outline_sensing(ax, [region.s for region in snapshot.density.unsafe], extent)
-    style.shade_unsafe(ax, snapshot.obstacles, extent)
+    paper.outline_sensing(ax, [region.s for region in snapshot.unsafe], extent)
+    paper.shade_unsafe(ax, snapshot.obstacles, extent)
     past = runs.time <= SNAPSHOT
     for moving in field.unsafe:
         path = np.array([moving.motion.position(t) for t in runs.time[past]])
@@ -127,13 +124,13 @@ def draw_plane(ax: Axes, runs: TrackingRuns) -> None:
     target = np.array([TARGET.position(t) for t in runs.time[past]])
     ax.plot(*target.T, color=style.GREEN, linewidth=2.5, label="path of the target")
     x = runs.x[past][:, :SHOWN]
-    style.draw_curves(ax, list(np.swapaxes(x, 0, 1)), [style.BLUE] * x.shape[1], width=1.2)
+    paper.draw_curves(ax, list(np.swapaxes(x, 0, 1)), [style.BLUE] * x.shape[1], width=1.2)
     ax.plot(*x[0].T, ".", color=style.BLACK, markersize=5, label="starts")
     style.mark_goal(ax, snapshot.goal)
     ax.legend(loc="upper left")
 
 
-def draw_rates(ax: Axes, runs: dict[float, TrackingRuns]) -> None:
+def draw_rates(ax: Axes, runs: dict[float, PointRuns]) -> None:
     shares = [Proportion(int(each.entered.sum()), len(each.entered)) for each in runs.values()]
     rate = 100.0 * np.array([share.rate for share in shares])
     interval = 100.0 * np.array([share.interval for share in shares]).T
@@ -146,19 +143,18 @@ def draw_rates(ax: Axes, runs: dict[float, TrackingRuns]) -> None:
 
 
 def main(arguments: list[str] | None = None) -> None:
-    options = figure_arguments(__doc__, starts=1000, arguments=arguments)
+    options = paper.figure_arguments(__doc__, starts=1000, arguments=arguments)
     starts = random_starts(options.starts)
+    plant = SingleIntegrator(EuclideanSpace(2), DT)
     runs = {
-        ratio: track_points(
-            scene(ratio * U_MAX), SingleIntegrator(EuclideanSpace(2), DT), starts, U_MAX, DURATION
-        )
+        ratio: run_points(scene(ratio * U_MAX).at, plant, starts, U_MAX, DURATION)
         for ratio in SLOW + FAST
     }
     free = continuous(UNBOUNDED_SPEED, starts[: max(1, options.starts // 10)])
-    style.save_figure(draw(runs, free), options.out, "moving_scene")
+    paper.save_figure(draw(runs, free), options.out, "moving_scene")
     slow = [runs[ratio] for ratio in SLOW]
     settled = max(summary(each)["median_error_settled_m"] for each in slow)
-    FigureReport(
+    paper.FigureReport(
         "Moving obstacles and target",
         "With θ = 0 in the log gauge and the target's velocity fed forward, obstacles slower than "
         "u_max enter no start, and with unbounded control neither do faster ones; the tracking "

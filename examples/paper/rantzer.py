@@ -1,23 +1,23 @@
 """Rantzer's condition ∇·(ρk) ≥ 0, which [ZNV] Lemma 1 rests on, by gauge and by α."""
 
 import numpy as np
+import paper_figure as paper
 from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
-from densarm.arrays import Array
-from densarm.density.divergence import RantzerCondition, rantzer_condition, rantzer_map
-from densarm.density.euclidean_density import EuclideanDensity
-from densarm.density.gauge import Gauge
+from densarm.arms.joint_space import EuclideanSpace
 from densarm.density.goal_distance import EuclideanDistance
-from densarm.density.implicit_function import UnsafeRegion
-from densarm.density.implicit_shapes import Ball
-from densarm.density.navigation_density import DensityParameters, NavigationDensity
-from densarm.fields.integral_curves import CurveParameters, integral_curves
-from densarm.outcome import Outcome
-from densarm.simulation.proportion import Proportion
+from densarm.density.navigation_density import DensityParameters, Gauge, NavigationDensity
+from densarm.density.rantzer import RantzerCondition, rantzer_condition
+from densarm.euclidean.density import EuclideanDensity, rantzer_map
+from densarm.euclidean.implicit import UnsafeRegion
+from densarm.euclidean.integral_curves import CurveParameters, integral_curves
+from densarm.euclidean.runs import Proportion
+from densarm.euclidean.shapes import Ball
+from densarm.values.arrays import Array
+from densarm.values.outcome import Outcome
 from densarm.visualization import figure_style as style
-from densarm.visualization.figure_report import FigureReport, figure_arguments
 
 TARGET = np.array([4.0, -3.0])  # the scene of Fig. 3 [m]
 REGION = UnsafeRegion(h=Ball(radius=2.0), s=Ball(radius=3.0))  # [m]
@@ -74,8 +74,8 @@ def free_space(n: int, alpha: float) -> RantzerCondition:
     """The condition by differences at a point 1 m from the goal, rounded to their accuracy."""
     parameters = DensityParameters(alpha=alpha)
     point = np.random.default_rng(n).standard_normal(n)
-    free = NavigationDensity([], EuclideanDistance(np.zeros(n)), parameters)
-    record = rantzer_condition(free, point / np.linalg.norm(point), np.add, step=1e-4)
+    free = NavigationDensity(EuclideanSpace(n), np.zeros(n), [], EuclideanDistance(), parameters)
+    record = rantzer_condition(free, point / np.linalg.norm(point), step=1e-4)
     return RantzerCondition(record.laplacian.round(6), record.squared_gradient)
 
 
@@ -98,10 +98,10 @@ def draw_maps() -> Figure:
         for row, gauge in zip(axes, Gauge, strict=True):
             sign = np.zeros(free.shape)
             sign[free] = record.sign(gauge)
-            style.plane_axes(row[column], EXTENT, f"{gauge} gauge, α = {alpha:g}")
+            paper.plane_axes(row[column], EXTENT, f"{gauge} gauge, α = {alpha:g}")
             row[column].imshow(sign, extent=EXTENT, origin="lower", cmap=colours, vmin=-1, vmax=1)
-            style.outline_sensing(row[column], [REGION.s], EXTENT)
-            style.shade_unsafe(row[column], [REGION.h], EXTENT)
+            paper.outline_sensing(row[column], [REGION.s], EXTENT)
+            paper.shade_unsafe(row[column], [REGION.h], EXTENT)
             style.mark_goal(row[column], TARGET)
             row[column].label_outer()
     meaning = {style.SKY: "> 0", "white": "= 0", style.VERMILION: "< 0: fails"}
@@ -112,7 +112,10 @@ def draw_maps() -> Figure:
     return figure
 
 
-def draw_shares(shares: dict[tuple[float, float], dict[Gauge, float]], leaks: dict) -> Figure:
+def draw_shares(
+    shares: dict[tuple[float, float], dict[Gauge, float]],
+    leaks: dict[tuple[float, float], Proportion],
+) -> Figure:
     figure = style.new_figure(10.0, 4.2)
     gauges, leak = figure.subplots(1, 2)
     colours = (style.BLUE, style.ORANGE, style.VERMILION)
@@ -176,7 +179,7 @@ def report(
 
 
 def main(arguments: list[str] | None = None) -> None:
-    options = figure_arguments(__doc__, starts=1000, arguments=arguments)
+    options = paper.figure_arguments(__doc__, starts=1000, arguments=arguments)
     x = sensing_grid(SIDE)
     pairs = [(theta, alpha) for theta in THETAS for alpha in ALPHAS]
     shares = {(theta, alpha): failing_share(alpha, theta, x) for theta, alpha in pairs}
@@ -184,10 +187,10 @@ def main(arguments: list[str] | None = None) -> None:
         (theta, alpha): Proportion(entered(alpha, theta, options.starts), options.starts)
         for theta, alpha in pairs
     }
-    style.save_figure(draw_maps(), options.out, "rantzer_maps")
-    style.save_figure(draw_shares(shares, leaks), options.out, "rantzer_shares")
+    paper.save_figure(draw_maps(), options.out, "rantzer_maps")
+    paper.save_figure(draw_shares(shares, leaks), options.out, "rantzer_shares")
     numbers = report(shares, leaks, options.starts, len(x))
-    FigureReport(
+    paper.FigureReport(
         "Rantzer's condition",
         "[ZNV] Lemma 1 and theorem: a large enough α makes ∇·(ρ∇ρ) ≥ 0 almost everywhere, and "
         "almost every start outside the sensing region reaches the target without entering the "

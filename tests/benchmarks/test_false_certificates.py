@@ -4,8 +4,11 @@ import runpy
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
+from typing import Any
 
 import pytest
+
+from densarm.simulation.run import Run
 
 BENCHMARKS = Path(__file__).parents[2] / "benchmarks"
 KINDS = [
@@ -19,20 +22,24 @@ KINDS = [
 
 
 @pytest.fixture
-def script(monkeypatch):
+def script(monkeypatch: pytest.MonkeyPatch) -> Any:
     monkeypatch.syspath_prepend(str(BENCHMARKS))
     return SimpleNamespace(**runpy.run_path(str(BENCHMARKS / "false_certificates.py")))
 
 
 @pytest.mark.parametrize("name", KINDS)
-def test_tampering_is_refused_by_the_part_it_breaks(script, swing_up_run, name):
+def test_tampering_is_refused_by_the_part_it_breaks(
+    script: Any, swing_up_run: Run, name: str
+) -> None:
     tally = script.Tally()
     script.judge(name, [swing_up_run], 1, tally)
     assert (tally.runs, tally.refused, tally.as_meant) == (1, 1, 1)
     assert tally.false_certificates == []
 
 
-def test_a_false_certificate_is_counted(script, swing_up_run, monkeypatch):
+def test_a_false_certificate_is_counted(
+    script: Any, swing_up_run: Run, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """Tampering that leaves the run as it was passes, and that is seen."""
     harmless = replace(script.KINDS["goal moved"], tamper=lambda run, _: run)
     monkeypatch.setitem(script.KINDS, "harmless", harmless)

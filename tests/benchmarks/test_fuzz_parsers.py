@@ -34,7 +34,7 @@ with watch.watching():
 """
 
 
-def test_the_watch(tmp_path):
+def test_the_watch(tmp_path: Path) -> None:
     command = [sys.executable, "-c", SCRIPT, str(tmp_path)]
     done = subprocess.run(
         command,

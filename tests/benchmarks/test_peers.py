@@ -5,6 +5,7 @@ import runpy
 import sys
 from importlib.util import find_spec
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pinocchio as pin
@@ -15,17 +16,17 @@ STATE = 700
 
 
 @pytest.fixture(autouse=True)
-def _scripts(monkeypatch):
+def _scripts(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.syspath_prepend(str(BENCHMARKS))
 
 
-def needs(package):
+def needs(package: str) -> None:
     if find_spec(package) is None:
         pytest.skip(f"{package} is not installed: pip install '.[peers]'")
 
 
-def agrees(step, task, pairs):
-    found, exact = step.distances(STATE), task.clearance.distances(task.q[STATE])
+def agrees(step: Any, task: Any, pairs: int) -> None:
+    found, exact = step.distances(STATE), task.world.distances(task.q[STATE])
     computed = np.isfinite(found)
     assert computed.sum() == pairs
     np.testing.assert_allclose(found[computed], exact[computed], atol=1e-6)
@@ -33,30 +34,31 @@ def agrees(step, task, pairs):
 
 
 @pytest.fixture
-def task():
+def task() -> Any:
     from control_steps.task import panda_task
 
     return panda_task("capsule", 2, "close")
 
 
-def test_pink_measures_the_same(task):
+def test_pink_measures_the_same(task: Any) -> None:
     needs("pink")
     from control_steps.pink_step import PinkStep
 
-    agrees(PinkStep(task, task.clearance.n_pairs), task, task.clearance.n_pairs)
+    agrees(PinkStep(task, task.world.n_pairs), task, task.world.n_pairs)
 
 
-def test_mink_measures_the_same_where_it_looks(task):
+def test_mink_measures_the_same_where_it_looks(task: Any) -> None:
     needs("mink")
     from control_steps.mink_step import MinkStep
 
-    near = int((task.clearance.distances(task.q[STATE]) < 0.1).sum())
-    assert 0 < near < task.clearance.n_pairs
+    near = int((task.world.distances(task.q[STATE]) < 0.1).sum())
+    assert 0 < near < task.world.n_pairs
     agrees(MinkStep(task, 0.1), task, near)
-    agrees(MinkStep(task, 10.0), task, task.clearance.n_pairs)
+    agrees(MinkStep(task, 10.0), task, task.world.n_pairs)
 
 
-def test_the_arm_in_jax_is_the_same(task):
+@pytest.mark.slow
+def test_the_arm_in_jax_is_the_same(task: Any) -> None:
     """Of cbfpy's step alone, which takes JAX some ten seconds to compile."""
     needs("jax")
     from control_steps.jax_arm import JaxArm
@@ -64,14 +66,17 @@ def test_the_arm_in_jax_is_the_same(task):
     arm, q, v, model = JaxArm(task.arm), task.q[STATE], 2.0 * task.v[STATE], task.arm.model
     centers = np.array([sphere.position for sphere in task.spheres])
     radii = np.array([sphere.radius for sphere in task.spheres])
-    exact = task.clearance.distances(q)
+    exact = task.world.distances(q)
     np.testing.assert_allclose(arm.sphere_distances(q, centers, radii), exact, atol=1e-5)
     bias = pin.nonLinearEffects(model, model.createData(), q, v)
     np.testing.assert_allclose(arm.bias(q, v), bias, atol=1e-4)
     np.testing.assert_allclose(arm.mass_matrix(q), task.arm.mass_matrix(q), atol=1e-5)
 
 
-def test_the_comparison_is_printed_kept_and_drawn(tmp_path, monkeypatch, capsys):
+@pytest.mark.slow
+def test_the_comparison_is_printed_kept_and_drawn(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
     file, picture = tmp_path / "peers.json", tmp_path / "peers.png"
     small = ["--spheres", "1", "--blocks", "2", "2", "--rounds", "1", "--peers", "absent"]
     tasks = ["--tasks", "capsule-scattered", "--json", str(file), "--figure", str(picture)]

@@ -3,6 +3,7 @@
 import json
 import runpy
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -10,7 +11,7 @@ BENCHMARKS = Path(__file__).parents[2] / "benchmarks"
 
 
 @pytest.fixture
-def script(monkeypatch):
+def script(monkeypatch: pytest.MonkeyPatch) -> Any:
     monkeypatch.syspath_prepend(str(BENCHMARKS))
     return runpy.run_path(str(BENCHMARKS / "planners.py"))
 
@@ -37,7 +38,9 @@ METADATA = {
 }
 
 
-def test_both_pipelines_solve_an_easy_problem(script, tmp_path, capsys):
+def test_both_pipelines_solve_an_easy_problem(
+    script: Any, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     file, kept = tmp_path / "problems.json", tmp_path / "planners.json"
     file.write_text(json.dumps({"metadata": METADATA, "problems": [PROBLEM]}))
     script["main"](["--problems", str(file), "--json", str(kept)])
@@ -47,9 +50,9 @@ def test_both_pipelines_solve_an_easy_problem(script, tmp_path, capsys):
     assert "computed torque" in capsys.readouterr().out
 
 
-def test_contacts_are_counted(script):
+def test_contacts_are_counted(script: Any) -> None:
     runs = [
-        {"outcome": o, "plan_time_s": 1.0, "duration_s": 2.0, "min_clearance_m": c}
+        {"outcome": o, "preparation_time_s": 1.0, "duration_s": 2.0, "min_clearance_m": c}
         for o, c in (("reached", 0.01), ("collided", -0.001), ("reached", 0.03))
     ]
     found = script["summary"](runs)

@@ -3,6 +3,7 @@
 import json
 import runpy
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -10,12 +11,15 @@ BENCHMARKS = Path(__file__).parents[2] / "benchmarks"
 
 
 @pytest.fixture
-def script(monkeypatch):
+def script(monkeypatch: pytest.MonkeyPatch) -> Any:
     monkeypatch.syspath_prepend(str(BENCHMARKS))
     return runpy.run_path(str(BENCHMARKS / "step_sizes.py"))
 
 
-def test_sizes_are_measured_kept_and_drawn(script, tmp_path, capsys):
+@pytest.mark.slow
+def test_sizes_are_measured_kept_and_drawn(
+    script: Any, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     file, picture = tmp_path / "sizes.json", tmp_path / "sizes.png"
     sizes = ["--shapes", "capsule", "--pairs", "8", "--steps", "200"]
     script["main"]([*sizes, "--json", str(file), "--figure", str(picture)])

@@ -1,3 +1,5 @@
+"""The command line in this process, and what the swing-up left, in a process of its own too."""
+
 import subprocess
 import sys
 from collections.abc import Callable
@@ -7,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from densarm.cli import main
+from densarm.simulation.run import Run
 
 PROGRAM = [sys.executable, "-c", "import sys; from densarm.cli import main; sys.exit(main())"]
 
@@ -35,8 +38,16 @@ def command(capsys: pytest.CaptureFixture[str]) -> Command:
     return run
 
 
+@pytest.fixture(scope="session")
+def saved(swing_up_run: Run, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The file of a certified run."""
+    path = tmp_path_factory.mktemp("saved") / "swing_up.npz"
+    swing_up_run.save(path)
+    return path
+
+
 @dataclass(frozen=True)
-class SwingUp:
+class Recorded:
     """The swing-up, as a process of its own ran it and wrote it."""
 
     done: Done
@@ -47,14 +58,14 @@ class SwingUp:
 
 
 @pytest.fixture(scope="session")
-def swing_up(tmp_path_factory: pytest.TempPathFactory) -> SwingUp:
+def recorded(tmp_path_factory: pytest.TempPathFactory) -> Recorded:
     folder = tmp_path_factory.mktemp("swing_up")
     npz, html, png, json = (folder / f"run.{kind}" for kind in ("npz", "html", "png", "json"))
-    options = ["--save", npz, "--html", html, "--plot", png, "--json", json]
+    options: list[str | Path] = ["--save", npz, "--html", html, "--plot", png, "--json", json]
     done = subprocess.run(
         [*PROGRAM, "run", "swing_up", *options], capture_output=True, text=True, check=False
     )
-    return SwingUp(Done(done.returncode, done.stdout, done.stderr), npz, html, png, json)
+    return Recorded(Done(done.returncode, done.stdout, done.stderr), npz, html, png, json)
 
 
 @pytest.fixture

@@ -1,15 +1,22 @@
+"""The command and its subcommands: helps, usage, the list, and what is not imported."""
+
 import json
 import shutil
 import subprocess
 import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
 
 import click
 import pytest
 
-from densarm.catalogue import robot_names, robots_folder, scenario_paths
+from densarm.arms.catalogue import robot_names, robots_folder, scenario_paths
 from densarm.cli.application import application
 from densarm.cli.run import run
-from densarm.scenario import GuideKind
+from densarm.planning.plan import GUIDES
+
+Command = Callable[..., Any]
 
 
 def paths(group: click.Group, before: tuple[str, ...] = ()) -> list[tuple[str, ...]]:
@@ -21,8 +28,10 @@ def paths(group: click.Group, before: tuple[str, ...] = ()) -> list[tuple[str, .
     return found
 
 
-@pytest.mark.parametrize("path", [(), *paths(application)])
-def test_every_help_explains_itself_with_an_example(command, path):
+@pytest.mark.parametrize("path", [(), *paths(application())])
+def test_every_help_explains_itself_with_an_example(
+    command: Command, path: tuple[str, ...]
+) -> None:
     done = command(*path, "--help")
     assert done.status == 0
     assert done.err == ""
@@ -31,23 +40,26 @@ def test_every_help_explains_itself_with_an_example(command, path):
     assert f"    densarm {' '.join(path)}" in done.out
 
 
-@pytest.mark.parametrize("path", paths(application))
-def test_every_option_and_argument_is_explained(path):
-    command = application
+@pytest.mark.parametrize("path", paths(application()))
+def test_every_option_and_argument_is_explained(path: tuple[str, ...]) -> None:
+    command: click.Command = application()
     for name in path:
+        assert isinstance(command, click.Group)
         command = command.commands[name]
     options = [param for param in command.params if isinstance(param, click.Option)]
     assert all(option.help for option in options)
 
 
-def test_without_arguments_it_prints_the_help(command):
+def test_without_arguments_it_prints_the_help(command: Command) -> None:
     assert command() == command("--help")
 
 
-def test_list_names_robots_and_scenarios_with_what_they_hold(command, tmp_path, monkeypatch):
+def test_list_names_robots_and_scenarios_with_what_they_hold(
+    command: Command, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     for name in ("two_link", "panda"):
         shutil.copytree(robots_folder() / name, tmp_path / name)
-    monkeypatch.setattr("densarm.catalogue.robots_folder", lambda: tmp_path)
+    monkeypatch.setattr("densarm.arms.catalogue.robots_folder", lambda: tmp_path)
     done = command("list")
     assert (done.status, done.err) == (0, "")
     rows = {cells[0]: cells[1:] for line in done.out.splitlines() if (cells := line.split())}
@@ -58,7 +70,7 @@ def test_list_names_robots_and_scenarios_with_what_they_hold(command, tmp_path, 
     assert "Swing a two-link arm from hanging to upright between two obstacles" in done.out
 
 
-def test_help_starts_without_heavy_libraries():
+def test_help_starts_without_heavy_libraries() -> None:
     script = (
         "import json, sys; from densarm.cli import main; main(['--help']);"
         "print(json.dumps(list(sys.modules)))"
@@ -70,9 +82,23 @@ def test_help_starts_without_heavy_libraries():
     assert heavy & set(json.loads(done.stdout.splitlines()[-1])) == set()
 
 
-def test_guides_to_choose_from_are_those_that_exist():
+@pytest.mark.slow
+def test_a_run_starts_without_what_it_does_not_need(scenario_file: Callable[..., Path]) -> None:
+    script = (
+        f"import json, sys; from densarm.cli import main; main(['run', {str(scenario_file())!r}]);"
+        "print(json.dumps(list(sys.modules)))"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", script], capture_output=True, text=True, check=True
+    )
+    needless = {"matplotlib", "meshcat", "PIL", "rich"}
+    assert needless & set(json.loads(done.stdout.splitlines()[-1])) == set()
+
+
+def test_guides_to_choose_from_are_those_that_exist() -> None:
     guide = next(param for param in run.params if param.name == "guide")
-    assert set(guide.type.choices) == set(GuideKind)
+    assert isinstance(guide.type, click.Choice)
+    assert set(guide.type.choices) == set(GUIDES)
 
 
 @pytest.mark.parametrize(
@@ -89,7 +115,7 @@ def test_guides_to_choose_from_are_those_that_exist():
         (["bench", "step", "--pairs", "0"], "--pairs"),
     ],
 )
-def test_wrong_usage_is_one_line(command, arguments, expected):
+def test_wrong_usage_is_one_line(command: Command, arguments: list[str], expected: str) -> None:
     done = command(*arguments)
     assert done.status == 2
     assert done.out == ""

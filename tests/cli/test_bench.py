@@ -1,19 +1,28 @@
+"""``densarm bench``: what each benchmark prints, writes and keeps."""
+
 import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
-from densarm.bench.first_call import FirstCall, FirstCalls
-from densarm.bench.problem_result import ProblemResult
-from densarm.trajectory import Trajectory
+from densarm.scene.loading import MotionProblem
+from densarm.simulation.run import Run
+from densarm.study.problems import ProblemResult
+from densarm.study.step import FirstCall
 
+Command = Callable[..., Any]
 GOAL = [np.cos(0.5), np.sin(0.5)]  # of the shoulder
 
 
 @pytest.mark.parametrize(("arm", "pairs"), [("two_link", 4), ("panda", 20)])
-def test_step_reports_its_keys(command, tmp_path, monkeypatch, arm, pairs):
-    first = FirstCalls(FirstCall(9.0, 300.0), FirstCall(0.4, 200.0))
-    monkeypatch.setattr("densarm.bench.first_call.time_first_calls", lambda *_: first)
+def test_step_reports_its_keys(
+    command: Command, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, arm: str, pairs: int
+) -> None:
+    first = FirstCall(9.0, 300.0), FirstCall(0.4, 200.0)
+    monkeypatch.setattr("densarm.study.step.time_first_calls", lambda *_: first)
     path = tmp_path / "step.json"
     done = command("bench", "step", "--arm", arm, "--pairs", pairs, "--steps", 250, "--json", path)
     assert done.status == 0
@@ -36,7 +45,8 @@ def test_step_reports_its_keys(command, tmp_path, monkeypatch, arm, pairs):
 RANDOM = ("bench", "random", "--arm", "two_link", "--problems", 1, "--scenes", "none")
 
 
-def test_random_problems_are_counted_and_written(command, tmp_path):
+@pytest.mark.slow
+def test_random_problems_are_counted_and_written(command: Command, tmp_path: Path) -> None:
     path = tmp_path / "random.json"
     done = command(*RANDOM, "--guide", "both", "--time-optimal", "--json", path)
     assert (done.status, done.err) == (0, "")
@@ -50,25 +60,27 @@ def test_random_problems_are_counted_and_written(command, tmp_path):
     assert ["all", "1"] in rows
 
 
-def test_problems_that_were_not_solved_are_named(command, monkeypatch):
-    monkeypatch.setattr(
-        "densarm.bench.problem_results.run_problem",
-        lambda problem, **_: ProblemResult("empty", problem.index, "no_path", "walls all round"),
-    )
+def test_problems_that_were_not_solved_are_named(
+    command: Command, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def run(problem: MotionProblem, **_: object) -> ProblemResult:
+        return ProblemResult("empty", problem.index, "no_path", "walls all round")
+
+    monkeypatch.setattr("densarm.study.problems.run_problem", run)
     done = command(*RANDOM)
     assert done.status == 0
     assert "empty 0 no_path: walls all round" in done.out
     assert ["all", "0", "0", "0", "0", "1"] in [line.split()[:6] for line in done.out.splitlines()]
 
 
-def test_scenes_that_do_not_exist(command):
+def test_scenes_that_do_not_exist(command: Command) -> None:
     done = command("bench", "random", "--scenes", "fog")
     assert done.status == 2
     assert "shelf" in done.err
 
 
 @pytest.fixture
-def collection(tmp_path):
+def collection(tmp_path: Path) -> Path:
     """One problem without obstacles, one whose start touches a ball."""
     ball = {"type": "sphere", "name": "ball", "radius": 0.1, "position": [0.0, 0.0, -1.0]}
     ends = {"index": 3, "start": [0.0, 0.0], "goal": [-0.3, 0.5]}
@@ -84,7 +96,9 @@ def collection(tmp_path):
     return path
 
 
-def test_collection_is_run_and_kept(command, collection, tmp_path, monkeypatch):
+def test_collection_is_run_and_kept(
+    command: Command, collection: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     path, runs = tmp_path / "results.json", tmp_path / "runs"
     arguments = ["--problems", collection, "--save-dir", runs, "--json", path]
     done = command("bench", "motionbenchmaker", *arguments)
@@ -94,14 +108,18 @@ def test_collection_is_run_and_kept(command, collection, tmp_path, monkeypatch):
     assert [entry["outcome"] for entry in data["problems"]] == ["reached", "infeasible"]
     assert sorted(file.name for file in runs.iterdir()) == ["ball_3.npz", "empty_3.npz"]
     # The joints are those that the file names, in its order.
-    np.testing.assert_array_equal(Trajectory.load(runs / "empty_3.npz").scenario.goal[:2], GOAL)
+    goal = Run.load(runs / "empty_3.npz").task.goal
+    assert goal is not None
+    np.testing.assert_array_equal(goal[:2], GOAL)
 
-    monkeypatch.setattr("densarm.bench.problem_results.simulate", None)
+    monkeypatch.setattr("densarm.study.problems.run_scenario", None)
     again = command("bench", "motionbenchmaker", *arguments)
     assert (again.status, again.out) == (0, done.out)
 
 
-def test_record_of_another_problem_is_not_taken(command, collection, tmp_path):
+def test_record_of_another_problem_is_not_taken(
+    command: Command, collection: Path, tmp_path: Path
+) -> None:
     runs = tmp_path / "runs"
     arguments = ["bench", "motionbenchmaker", "--problems", collection, "--save-dir", runs]
     command(*arguments, "--guide", "direct")
@@ -111,13 +129,13 @@ def test_record_of_another_problem_is_not_taken(command, collection, tmp_path):
     assert "another problem" in done.out
 
 
-def test_one_of_so_many(command, collection):
+def test_one_of_so_many(command: Command, collection: Path) -> None:
     done = command("bench", "motionbenchmaker", "--problems", collection, "--every", 2)
     assert "empty" in done.out
     assert "ball" not in done.out
 
 
-def test_robot_of_other_joints(command, collection):
+def test_robot_of_other_joints(command: Command, collection: Path) -> None:
     collection.write_text(collection.read_text().replace("elbow", "wrist"), encoding="utf-8")
     done = command("bench", "motionbenchmaker", "--problems", collection)
     assert done.status == 2

@@ -1,13 +1,22 @@
+"""``densarm compare``: its table, plot and JSON, and wrong input."""
+
 import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
 
 import pytest
 
-from densarm.study.methods import METHODS
+from densarm.study.baselines import BASELINES
 
+Command = Callable[..., Any]
 UNTUNED = ("--tuning-starts", 0)
 
 
-def test_table_plot_and_json(command, scenario_file, tmp_path):
+@pytest.mark.slow
+def test_table_plot_and_json(
+    command: Command, scenario_file: Callable[..., Path], tmp_path: Path
+) -> None:
     path, plot = tmp_path / "compare.json", tmp_path / "compare.png"
     options = ["--starts", 2, "--seed", 4, "--tuning-starts", 1, "--json", path, "--plot", plot]
     coarse = scenario_file(rest="[simulation]\ndt = 0.005")
@@ -29,7 +38,7 @@ def test_table_plot_and_json(command, scenario_file, tmp_path):
         assert row.split()[-1] == f"{entry['step_us']:.0f}"
 
 
-def test_status_is_zero_whatever_was_reached(command):
+def test_status_is_zero_whatever_was_reached(command: Command) -> None:
     done = command("compare", "swing_up", "--methods", "potential_field", "--starts", 1, *UNTUNED)
     assert done.status == 0
     row = next(line for line in done.out.splitlines() if "potential_field" in line)
@@ -48,7 +57,7 @@ def test_status_is_zero_whatever_was_reached(command):
         (["--plot", "compare.gif"], ["--plot", ".png"]),
     ],
 )
-def test_wrong_input_is_one_line(command, options, expected):
+def test_wrong_input_is_one_line(command: Command, options: list[str], expected: list[str]) -> None:
     done = command("compare", "swing_up", *options)
     assert done.status == 2
     assert done.out == ""
@@ -56,6 +65,6 @@ def test_wrong_input_is_one_line(command, options, expected):
     assert all(part in done.err for part in expected), done.err
 
 
-def test_help_names_every_method(command):
+def test_help_names_every_baseline(command: Command) -> None:
     words = command("compare", "--help").out.replace(",", " ").split()
-    assert set(METHODS) <= set(words)
+    assert set(BASELINES) <= set(words)

@@ -1,21 +1,28 @@
+"""Ctrl-C: status 130, one line, and no file half written."""
+
 import os
 import pty
 import signal
 import subprocess
 import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, BinaryIO
 
 import numpy as np
 import pytest
 
-from densarm.simulation.plant import PinocchioPlant
+from densarm.simulation.plants import PinocchioPlant
+
+Command = Callable[..., Any]
 
 # A process started in the background inherits that Ctrl-C is ignored. A whole run takes a tenth of
 # a second, which may pass between two drawings of the terminal: here planning and steps are slow.
 PROGRAM = """
 import signal, sys, time
 from densarm.cli import main
-from densarm.guides.path import PathGuide
-from densarm.simulation.plant import PinocchioPlant
+from densarm.planning.path_guide import PathGuide
+from densarm.simulation.plants import PinocchioPlant
 plan, step = PathGuide.plan, PinocchioPlant.step
 PathGuide.plan = lambda *problem: time.sleep(0.5) or plan(*problem)
 PinocchioPlant.step = lambda *state: time.sleep(0.01) or step(*state)
@@ -24,12 +31,13 @@ sys.exit(main())
 """
 
 
-def interrupt(*_arguments, **_options):
+def interrupt(*_arguments: object, **_options: object) -> None:
     signal.raise_signal(signal.SIGINT)
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform != "linux", reason="reads a pseudo-terminal as Linux has them")
-def test_ctrl_c_on_a_terminal_while_running(tmp_path):
+def test_ctrl_c_on_a_terminal_while_running(tmp_path: Path) -> None:
     ours, theirs = pty.openpty()
     process = subprocess.Popen(
         [sys.executable, "-c", PROGRAM, "run", "swing_up", "--save", tmp_path / "run.npz"],
@@ -51,7 +59,9 @@ def test_ctrl_c_on_a_terminal_while_running(tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
-def test_ctrl_c_while_running(command, tmp_path, monkeypatch):
+def test_ctrl_c_while_running(
+    command: Command, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(PinocchioPlant, "step", interrupt)
     done = command("run", "swing_up", "--save", tmp_path / "run.npz")
     assert done.status == 130
@@ -59,8 +69,13 @@ def test_ctrl_c_while_running(command, tmp_path, monkeypatch):
     assert list(tmp_path.iterdir()) == []
 
 
-def test_ctrl_c_while_saving(command, scenario_file, tmp_path, monkeypatch):
-    def begin(file, **_arrays):
+def test_ctrl_c_while_saving(
+    command: Command,
+    scenario_file: Callable[..., Path],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def begin(file: BinaryIO, **_arrays: object) -> None:
         file.write(b"PK")
         interrupt()
 
@@ -78,17 +93,27 @@ def test_ctrl_c_while_saving(command, scenario_file, tmp_path, monkeypatch):
         ("--plot", "run.png", "matplotlib.figure.Figure.savefig"),
         ("--png", "run.png", "densarm.visualization.picture.Picture.frame"),
         ("--gif", "run.gif", "densarm.visualization.picture.Picture.frame"),
-        ("--json", "run.json", "densarm.trajectory.Trajectory.summary"),
+        ("--json", "run.json", "densarm.simulation.run.Run.summary"),
     ],
 )
-def test_ctrl_c_while_writing(command, scenario_file, tmp_path, monkeypatch, option, name, writer):
+def test_ctrl_c_while_writing(
+    command: Command,
+    scenario_file: Callable[..., Path],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    option: str,
+    name: str,
+    writer: str,
+) -> None:
     monkeypatch.setattr(writer, interrupt)
     path = scenario_file()
     assert command("run", path, option, tmp_path / name).status == 130
     assert list(tmp_path.iterdir()) == [path]
 
 
-def test_ctrl_c_ends_the_view(command, swing_up, monkeypatch):
+def test_ctrl_c_ends_the_view(
+    command: Command, saved: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr("webbrowser.open", bool)
-    monkeypatch.setattr("densarm.visualization.page_server.PageServer.serve_forever", interrupt)
-    assert command("view", swing_up.npz).status == 130
+    monkeypatch.setattr("densarm.visualization.html_page.PageServer.serve_forever", interrupt)
+    assert command("view", saved).status == 130

@@ -1,10 +1,20 @@
+"""``densarm run``: what it prints and writes, how it ends, and that it compiles once."""
+
 import json
+import os
+import pty
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
-from densarm.trajectory import Trajectory
+from densarm.simulation.run import Run
 
+Command = Callable[..., Any]
 KEYS = [
     "outcome",
     "duration_s",
@@ -24,23 +34,27 @@ position = [{x}, 0.0, -1.9]
 """
 
 
-def test_swing_up_is_reached_and_says_so(swing_up):
-    assert swing_up.done.status == 0
-    assert swing_up.done.err == ""
-    assert "reached: The arm reached the goal" in swing_up.done.out
+@pytest.mark.slow
+def test_swing_up_is_reached_and_says_so(recorded: Any) -> None:
+    assert recorded.done.status == 0
+    assert recorded.done.err == ""
+    assert "reached: The arm reached the goal" in recorded.done.out
+    assert "compiled" not in recorded.done.out
     for label in ("duration", "min clearance", "goal error", "peak torque", "planning", "tracking"):
-        assert label in swing_up.done.out
+        assert label in recorded.done.out
     for check in ("certified", "swept", "start", "goal", "limits", "replay"):
-        assert f"{check} " in swing_up.done.out
+        assert f"{check} " in recorded.done.out
 
 
-def test_off_a_terminal_there_is_no_progress(swing_up):
-    assert "\x1b" not in swing_up.done.out
-    assert "planning\n" not in swing_up.done.out
+@pytest.mark.slow
+def test_off_a_terminal_there_is_no_progress(recorded: Any) -> None:
+    assert "\x1b" not in recorded.done.out
+    assert "planning\n" not in recorded.done.out
 
 
-def test_json_has_the_keys_of_the_summary(swing_up):
-    data = json.loads(swing_up.json.read_text(encoding="utf-8"))
+@pytest.mark.slow
+def test_json_has_the_keys_of_the_summary(recorded: Any) -> None:
+    data = json.loads(recorded.json.read_text(encoding="utf-8"))
     assert list(data) == KEYS
     assert data["outcome"] == "reached"
     assert data["certified"] is True
@@ -48,27 +62,30 @@ def test_json_has_the_keys_of_the_summary(swing_up):
     assert data["goal_error_rad"] <= 0.01
 
 
-def test_saved_run_is_the_one_summarised(swing_up):
-    run = Trajectory.load(swing_up.npz)
-    data = json.loads(swing_up.json.read_text(encoding="utf-8"))
+@pytest.mark.slow
+def test_saved_run_is_the_one_summarised(recorded: Any) -> None:
+    run = Run.load(recorded.npz)
+    data = json.loads(recorded.json.read_text(encoding="utf-8"))
     assert run.summary() == data
-    with np.load(swing_up.npz, allow_pickle=False) as arrays:
+    with np.load(recorded.npz, allow_pickle=False) as arrays:
         assert {"time", "q", "v", "tau", "clearance", "scenario"} <= set(arrays)
 
 
-def test_pages_are_what_their_names_say(swing_up):
-    page = swing_up.html.read_text(encoding="utf-8")
+@pytest.mark.slow
+def test_pages_are_what_their_names_say(recorded: Any) -> None:
+    page = recorded.html.read_text(encoding="utf-8")
     assert page.lstrip().lower().startswith("<!doctype html>")
     assert "Swing a two-link arm" in page
-    assert swing_up.png.read_bytes().startswith(b"\x89PNG")
+    assert recorded.png.read_bytes().startswith(b"\x89PNG")
 
 
-def test_nothing_else_is_left_in_the_folder(swing_up):
-    written = {swing_up.npz, swing_up.html, swing_up.png, swing_up.json}
-    assert set(swing_up.npz.parent.iterdir()) == written
+@pytest.mark.slow
+def test_nothing_else_is_left_in_the_folder(recorded: Any) -> None:
+    written = {recorded.npz, recorded.html, recorded.png, recorded.json}
+    assert set(recorded.npz.parent.iterdir()) == written
 
 
-def test_direct_guide_is_stuck_at_the_critical_point(command, tmp_path):
+def test_direct_guide_is_stuck_at_the_critical_point(command: Command, tmp_path: Path) -> None:
     done = command("run", "swing_up", "--guide", "direct", "--json", tmp_path / "run.json")
     assert done.status == 1
     assert done.err == ""
@@ -80,14 +97,18 @@ def test_direct_guide_is_stuck_at_the_critical_point(command, tmp_path):
     assert data["plan_time_s"] == 0.0
 
 
-def test_clearance_without_pairs_is_null(command, scenario_file, tmp_path):
+def test_clearance_without_pairs_is_null(
+    command: Command, scenario_file: Callable[..., Path], tmp_path: Path
+) -> None:
     done = command("run", scenario_file(), "--json", tmp_path / "run.json")
     assert done.status == 0
     assert "no pairs" in done.out
     assert json.loads((tmp_path / "run.json").read_text())["min_clearance_m"] is None
 
 
-def test_start_in_contact_is_infeasible_and_names_the_pair(command, scenario_file, tmp_path):
+def test_start_in_contact_is_infeasible_and_names_the_pair(
+    command: Command, scenario_file: Callable[..., Path], tmp_path: Path
+) -> None:
     path = scenario_file(rest=BALL.format(x=0.0))
     done = command("run", path, "--json", tmp_path / "run.json", "--save", tmp_path / "run.npz")
     assert done.status == 1
@@ -97,10 +118,12 @@ def test_start_in_contact_is_infeasible_and_names_the_pair(command, scenario_fil
     assert "ball" in done.out
     assert "mm" in done.out
     assert json.loads((tmp_path / "run.json").read_text())["outcome"] == "infeasible"
-    assert len(Trajectory.load(tmp_path / "run.npz").time) == 1
+    assert len(Run.load(tmp_path / "run.npz").time) == 1
 
 
-def test_goal_outside_the_limits_is_infeasible_and_names_the_joint(command, scenario_file):
+def test_goal_outside_the_limits_is_infeasible_and_names_the_joint(
+    command: Command, scenario_file: Callable[..., Path]
+) -> None:
     ready = "[0.0, -0.785, 0.0, -2.356, 0.0, 1.571, 0.785]"
     beyond = "[0.0, -0.785, 0.0, 1.0, 0.0, 1.571, 0.785]"
     done = command("run", scenario_file('name = "panda"', f"start = {ready}\ngoal = {beyond}"))
@@ -109,6 +132,53 @@ def test_goal_outside_the_limits_is_infeasible_and_names_the_joint(command, scen
 
 
 @pytest.mark.parametrize("kind", ["pdf", "svg"])
-def test_plots_in_other_formats(command, scenario_file, tmp_path, kind):
+@pytest.mark.slow
+def test_plots_in_other_formats(
+    command: Command, scenario_file: Callable[..., Path], tmp_path: Path, kind: str
+) -> None:
     assert command("run", scenario_file(), "--plot", tmp_path / f"run.{kind}").status == 0
     assert (tmp_path / f"run.{kind}").stat().st_size > 1000
+
+
+COMPILES_ANEW = """
+import sys
+import numba
+from densarm.cli import main, first_run
+from densarm.simulation import simulate
+first_run._is_compiled = lambda: True
+
+def compiling(*ends):
+    for _ in range(10):  # one takes no longer than a terminal from one drawing to the next
+        numba.njit(lambda x: x + 1)(1)
+    return infeasibility(*ends)
+
+infeasibility, simulate.infeasibility = simulate.infeasibility, compiling
+sys.exit(main())
+"""
+
+
+@pytest.mark.slow
+def test_kernels_that_are_compiled_are_told_of(scenario_file: Callable[..., Path]) -> None:
+    """Off a terminal in the summary, on one while it is done too."""
+    command = [sys.executable, "-c", COMPILES_ANEW, "run", str(scenario_file())]
+    done = subprocess.run(command, capture_output=True, text=True, check=True)
+    (line,) = (line for line in done.stdout.splitlines() if line.startswith("compiled"))
+    assert float(line.split()[1]) > 0.0
+    assert line.endswith(" s, once on this machine")
+    assert done.stderr == ""
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(sys.platform != "linux", reason="reads a pseudo-terminal as Linux has them")
+def test_compiling_is_shown_on_a_terminal(scenario_file: Callable[..., Path]) -> None:
+    ours, theirs = pty.openpty()
+    command = [sys.executable, "-c", COMPILES_ANEW, "run", str(scenario_file())]
+    env = {**os.environ, "TERM": "xterm"}
+    process = subprocess.Popen(command, stdin=theirs, stdout=theirs, env=env)
+    shown = b""
+    while b"compiling, once on this machine" not in shown:
+        shown += os.read(ours, 4096)
+    process.communicate(timeout=60)
+    os.close(theirs)
+    os.close(ours)
+    assert process.returncode == 0

@@ -1,6 +1,13 @@
+"""Wrong input: one line that says what is wrong and what is allowed, and nothing left behind."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
 import numpy as np
 import pytest
 
+Command = Callable[..., Any]
 URDF = """<robot name="bare">
   <link name="base"/>
   <link name="rod"><inertial><mass value="1"/>
@@ -10,7 +17,7 @@ URDF = """<robot name="bare">
 </robot>"""
 
 
-def refused(done, folder, *expected):
+def refused(done: Any, folder: Path, *expected: str) -> None:
     """Status 2, one line that says what is wrong, and nothing left behind but the inputs."""
     assert done.status == 2
     assert done.out == ""
@@ -21,10 +28,10 @@ def refused(done, folder, *expected):
     assert {path.name for path in folder.iterdir()} <= inputs
 
 
-def sphere(**changes):
+def sphere(**changes: object) -> str:
     values = {"type": '"sphere"', "name": '"ball"', "radius": 0.1, "position": [1.0, 0.0, 1.0]}
-    values = {key: value for key, value in (values | changes).items() if value is not None}
-    return "[[obstacles]]\n" + "\n".join(f"{key} = {value}" for key, value in values.items())
+    given = {key: value for key, value in (values | changes).items() if value is not None}
+    return "[[obstacles]]\n" + "\n".join(f"{key} = {value}" for key, value in given.items())
 
 
 @pytest.mark.parametrize(
@@ -59,32 +66,44 @@ def sphere(**changes):
         ({"rest": "[task"}, ["TOML"]),
     ],
 )
-def test_scenario_file(command, scenario_file, tmp_path, changes, expected):
+def test_scenario_file(
+    command: Command,
+    scenario_file: Callable[..., Path],
+    tmp_path: Path,
+    changes: dict[str, str],
+    expected: list[str],
+) -> None:
     path = scenario_file(**changes)
     done = command("run", path, "--save", tmp_path / "run.npz", "--json", tmp_path / "run.json")
     refused(done, tmp_path, str(path), *expected)
 
 
-def test_robot_without_collision_geometry(command, scenario_file, tmp_path):
+def test_robot_without_collision_geometry(
+    command: Command, scenario_file: Callable[..., Path], tmp_path: Path
+) -> None:
     (tmp_path / "robot.urdf").write_text(URDF, encoding="utf-8")
     path = scenario_file('urdf = "robot.urdf"', "start = [0.0]\ngoal = [0.5]")
     refused(command("run", path, "--save", tmp_path / "run.npz"), tmp_path, "'robot'", "collision")
 
 
-def test_robot_file_that_is_not_there(command, scenario_file, tmp_path):
+def test_robot_file_that_is_not_there(
+    command: Command, scenario_file: Callable[..., Path], tmp_path: Path
+) -> None:
     path = scenario_file('urdf = "missing.urdf"')
     refused(command("run", path), tmp_path, str(tmp_path / "missing.urdf"), "No such file")
 
 
-def test_scenario_that_is_not_there(command, tmp_path):
+def test_scenario_that_is_not_there(command: Command, tmp_path: Path) -> None:
     refused(command("run", "swing"), tmp_path, "'swing'", "did you mean 'swing_up'", "panda_shelf")
     missing = tmp_path / "missing.toml"
     refused(command("run", missing), tmp_path, str(missing), "No such file")
     refused(command("run", tmp_path), tmp_path, str(tmp_path))
 
 
-def test_outputs_are_checked_before_the_run(command, tmp_path, monkeypatch):
-    monkeypatch.setattr("densarm.closed_loop.simulate", pytest.fail)
+def test_outputs_are_checked_before_the_run(
+    command: Command, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("densarm.scenarios.run.run", pytest.fail)
     missing = tmp_path / "missing" / "run.npz"
     for option in ("--save", "--html", "--json", "--plot", "--png", "--gif"):
         done = command("run", "swing_up", option, missing)
@@ -99,7 +118,7 @@ def test_outputs_are_checked_before_the_run(command, tmp_path, monkeypatch):
 
 
 @pytest.mark.parametrize("verb", ["verify", "view"])
-def test_file_that_is_not_a_run(command, tmp_path, verb):
+def test_file_that_is_not_a_run(command: Command, tmp_path: Path, verb: str) -> None:
     (tmp_path / "not_a_run.npz").write_text("not a run", encoding="utf-8")
     np.savez(tmp_path / "other.npz", a=np.zeros(3))
     options = ["--json", tmp_path / "verify.json"] if verb == "verify" else []
@@ -108,6 +127,6 @@ def test_file_that_is_not_a_run(command, tmp_path, verb):
         refused(command(verb, path, *options), tmp_path, str(path))
 
 
-def test_arm_to_time(command, tmp_path):
+def test_arm_to_time(command: Command, tmp_path: Path) -> None:
     refused(command("bench", "step", "--arm", "atlas"), tmp_path, "'atlas'", "panda")
     refused(command("bench", "step", "--arm", "two_link", "--pairs", 3), tmp_path, "pairs = 3")

@@ -1,54 +1,39 @@
 """Controllers load or compile their kernels when they are made, none in a control loop."""
 
-import gc
-from dataclasses import replace
+import json
+import subprocess
+import sys
 
-import numpy as np
 import pytest
+
+PROGRAM = """
+import gc, json, os
+import numpy as np
 from numba.core.dispatcher import Dispatcher
-
-from densarm.clearance import Clearance
-from densarm.closed_loop import make_controller, make_velocity_controller
-from densarm.control.computed_torque import ComputedTorque
-from densarm.control.guarded_controller import GuardedController
+from densarm.arms.arm import load_arm
+from densarm.control.controller import Gains
+from densarm.control.regulation import DensityRegulation
+from densarm.control.replanning import Replanning
+from densarm.control.supervisor import Supervisor
+from densarm.control.tracking import DensityTracking
+from densarm.density.goal_distance import TorusDistance
 from densarm.errors import InvalidValueError
-from densarm.guides import GuidePath
-from densarm.motion_plan import MotionPlan
-from densarm.proof.swept_bound import SweptBound
-from densarm.reference.reference import Reference
-from densarm.scenario import ControlForm, load_scenario
+from densarm.planning.guide import GuidePath
+from densarm.planning.motion import Motion
+from densarm.scene.obstacles import Sphere
+from densarm.scene.scene import Scene
+from densarm.values.kernels import on_compiling
+from densarm.world.world import World
 
 
-def kernels() -> list[Dispatcher]:
-    found = [item for item in gc.get_objects() if isinstance(item, Dispatcher)]
-    return [item for item in found if item.py_func.__module__.startswith("densarm")]
-
-
-@pytest.fixture
-def fresh():
-    """Nothing is loaded, as in a new process."""
-    for kernel in kernels():
-        kernel._reset_overloads()
-
-
-def loaded() -> dict[str, int]:
-    return {str(item.py_func): len(item.overloads) for item in kernels() if item.overloads}
-
-
-def plan_of(form: ControlForm) -> MotionPlan:
-    scenario = load_scenario("swing_up")
-    scenario = replace(scenario, control=replace(scenario.control, form=form))
-    reference = None
-    if form == ControlForm.TRACKING:
-        angles = np.tile(scenario.arm.angles(scenario.start), (3, 1))
-        reference = Reference(0.001, angles, np.zeros_like(angles))
-    bound = SweptBound(Clearance(scenario.arm, scenario.scene))
-    path = GuidePath(np.stack([scenario.start, scenario.goal]), is_clear=False)
-    return MotionPlan(scenario, path, bound, reference)
+def loaded():
+    kernels = [item for item in gc.get_objects() if isinstance(item, Dispatcher)]
+    own = [item for item in kernels if item.py_func.__module__.startswith("densarm")]
+    return {str(item.py_func): len(item.signatures) for item in own if item.signatures}
 
 
 def states(arm):
-    """States as a caller may give them: arrays not to be written to, lists, parts of others."""
+    # As a caller may give them: arrays not to be written to, lists, parts of others.
     q, v = arm.configuration([0.4, 0.3]), np.array([0.1, -0.2])
     fixed = q.copy(), v.copy()
     for array in fixed:
@@ -58,53 +43,95 @@ def states(arm):
     yield 0.002, np.repeat(q, 2)[::2], np.repeat(v, 2)[::2]
 
 
-NO_STATES = [([0.0], [0.0]), (np.zeros((2, 2)), np.zeros((1, 2))), ([np.nan] * 4, [0.0, 0.0])]
+class Still:
+    def torque(self, t, q, v):
+        return np.zeros(2)
 
 
-@pytest.mark.usefixtures("fresh")
-@pytest.mark.parametrize("form", ControlForm)
-def test_torque_loads_no_kernel(form):
-    plan = plan_of(form)
-    arm, controller = plan.scenario.arm, make_controller(plan.scenario, plan)
+class Own:
+    def __init__(self, arm):
+        self.distance = TorusDistance(arm)
+
+    def evaluate(self, q, goal, out_gradient):
+        return self.distance.evaluate(q, goal, out_gradient)
+
+
+arm = load_arm("two_link")
+ball = Sphere(name="ball", radius=0.2, position=(1.5, 0.0, -0.5))
+world = World(arm, Scene([ball]))
+start, goal = arm.postures["hanging"], arm.postures["upright"]
+motion = Motion(0.001, np.tile([0.4, 0.3], (3, 1)), np.zeros((3, 2)))
+path = GuidePath(np.stack([start, goal]), is_clear=False)
+gains = Gains()
+make = {
+    "tracking": lambda: DensityTracking(world, motion),
+    "own distance": lambda: DensityTracking(world, motion, goal_distance=Own(arm)),
+    "regulation": lambda: DensityRegulation(world, goal, path=path),
+    "plain": lambda: DensityRegulation(world, goal, path=path, plain=True),
+    "velocity": lambda: DensityRegulation(world, goal),
+    "watching": lambda: Supervisor(arm, Still()),
+    "trusting": lambda: Supervisor(arm, DensityTracking(world, motion), tolerances=None),
+    "replanning": lambda: Replanning(
+        arm, goal, DensityTracking(world, motion), lambda q: None, 10.0, gains, 0.001
+    ),
+}
+NONE = [([0.0], [0.0]), (np.zeros((2, 2)), np.zeros((1, 2))), ([np.nan] * 4, [0.0, 0.0])]
+
+
+def report(name):
+    controller, compiled = make[name](), []
+    act = controller.velocity if name == "velocity" else controller.torque
     before = loaded()
-    for state in states(arm):
-        controller.torque(*state)
-    for q, v in NO_STATES:
-        with pytest.raises(InvalidValueError):
-            controller.torque(0.0, q, v)
-    controller.stop()
-    for state in states(arm):
-        controller.torque(*state)
-    assert loaded() == before
-    assert len(before) > 5
+    with on_compiling(compiled.append):
+        for state in states(arm):
+            act(*state)
+        for q, v in NONE:
+            try:
+                act(0.003, q, v)
+            except InvalidValueError:
+                pass
+        if name == "watching":
+            controller.stop()
+        for state in states(arm):
+            act(*state)
+    print(json.dumps([name, len(compiled), len(before), before == loaded()]), flush=True)
 
 
-@pytest.mark.usefixtures("fresh")
-def test_a_guard_loads_no_kernel_whatever_comes():
-    plan = plan_of(ControlForm.TRACKING)
-    arm = plan.scenario.arm
-    tracking = ComputedTorque(arm, plan.reference, plan.scenario.gains)
-    controller = GuardedController(arm, tracking, 0.001)
-    before = loaded()
-    for state in (*states(arm), *((0.003, *state) for state in NO_STATES), *states(arm)):
-        controller.torque(*state)
-    assert loaded() == before
-    assert len(before) > 5
+for name in make:
+    if child := os.fork():  # each as the first that its process makes
+        os.waitpid(child, 0)
+    else:
+        report(name)
+        os._exit(0)
+"""
+
+CONTROLLERS = [
+    "tracking",
+    "own distance",
+    "regulation",
+    "plain",
+    "velocity",
+    "watching",
+    "trusting",
+    "replanning",
+]
 
 
-@pytest.mark.usefixtures("fresh")
-def test_velocity_loads_no_kernel():
-    plan = plan_of(ControlForm.REGULATION)
-    controller = make_velocity_controller(plan.scenario, plan)
-    before = loaded()
-    for state in states(plan.scenario.arm):
-        controller.velocity(*state)
-    assert loaded() == before
-    assert len(before) > 5
+@pytest.fixture(scope="module")
+def reports() -> dict[str, tuple[int, int, bool]]:
+    program = [sys.executable, "-c", PROGRAM]
+    result = subprocess.run(program, capture_output=True, text=True, check=True)
+    assert result.stderr == ""
+    rows = [json.loads(line) for line in result.stdout.splitlines()]
+    return {name: (compiled, kernels, same) for name, compiled, kernels, same in rows}
 
 
-@pytest.mark.parametrize("form", [ControlForm.REGULATION, ControlForm.PLAIN])
-def test_a_new_controller_is_at_its_first_sub_goal(form):
-    plan = plan_of(form)
-    make_controller(plan.scenario, plan)
-    assert plan.guided.chain.current == 1
+@pytest.mark.slow
+@pytest.mark.parametrize("name", CONTROLLERS)
+def test_no_call_loads_or_compiles_a_kernel(
+    reports: dict[str, tuple[int, int, bool]], name: str
+) -> None:
+    compiled, kernels, same = reports[name]
+    assert compiled == 0
+    assert kernels >= 5
+    assert same

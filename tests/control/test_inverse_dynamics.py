@@ -3,60 +3,72 @@
 import numpy as np
 import pinocchio as pin
 import pytest
-from hypothesis import assume, given
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from densarm.arm import load_arm
+from densarm.arms.arm import Arm, load_arm
 from densarm.control.inverse_dynamics import InverseDynamics
+from densarm.values.arrays import Array
+
+State = tuple[Array, Array]
 
 
-def vectors(nv, size):
+def vectors(nv: int, size: float) -> st.SearchStrategy[Array]:
     return arrays(float, nv, elements=st.floats(-size, size))
 
 
 @pytest.fixture(scope="module", params=["two_link", "panda"])
-def arm(request):
+def arm(request: pytest.FixtureRequest) -> Arm:
     return load_arm(request.param)
 
 
 @pytest.fixture(scope="module")
-def dynamics(arm):
+def dynamics(arm: Arm) -> InverseDynamics:
     return InverseDynamics(arm, arm.limits.acceleration)
 
 
 @st.composite
-def states(draw, speed=3.0):
+def states(draw: st.DrawFn, speed: float = 3.0) -> State:
     return draw(vectors(7, 2.0)), draw(vectors(7, speed))
 
 
-def at(arm, dynamics, state):
+def at(arm: Arm, dynamics: InverseDynamics, state: State) -> State:
     q, v = arm.configuration(state[0][: arm.nv]), state[1][: arm.nv]
     dynamics.update(q, v)
     return q, v
 
 
-def acceleration(arm, q, v, tau):
-    return pin.aba(arm.model, arm.data, q, v, tau).copy()
+def acceleration(arm: Arm, q: Array, v: Array, tau: Array) -> Array:
+    return np.array(pin.aba(arm.model, arm.data, q, v, tau))
 
 
+@settings(max_examples=40)
 @given(state=states(), brake=vectors(7, 1e3), attract=vectors(7, 1e6))
-def test_torque_is_finite_and_within_limits(arm, dynamics, state, brake, attract):
+def test_torque_is_finite_and_within_limits(
+    arm: Arm, dynamics: InverseDynamics, state: State, brake: Array, attract: Array
+) -> None:
     at(arm, dynamics, state)
     tau = dynamics.torque(brake[: arm.nv], attract[: arm.nv])
     assert tau.shape == (arm.nv,)
     assert (np.abs(tau) <= arm.limits.effort).all()
 
 
+@settings(max_examples=40)
 @given(state=states(), scale=st.sampled_from([1e150, 1e-300]))
-def test_extreme_attraction(arm, dynamics, state, scale):
+def test_extreme_attraction(
+    arm: Arm, dynamics: InverseDynamics, state: State, scale: float
+) -> None:
     at(arm, dynamics, state)
     tau = dynamics.torque(np.zeros(arm.nv), np.full(arm.nv, scale))
     assert (np.abs(tau) <= arm.limits.effort).all()
 
 
+@settings(max_examples=40)
 @given(state=states(speed=0.5), wanted=vectors(7, 0.5), attract=vectors(7, 0.5))
-def test_exact_where_no_limit_binds(arm, dynamics, state, wanted, attract):
+def test_exact_where_no_limit_binds(
+    arm: Arm, dynamics: InverseDynamics, state: State, wanted: Array, attract: Array
+) -> None:
     q, v = at(arm, dynamics, state)
     total = (wanted + attract)[: arm.nv]
     expected = arm.mass_matrix(q) @ total + arm.nonlinear_effects(q, v)
@@ -67,8 +79,11 @@ def test_exact_where_no_limit_binds(arm, dynamics, state, wanted, attract):
     np.testing.assert_allclose(tau, expected, rtol=0, atol=1e-9)
 
 
+@settings(max_examples=40)
 @given(state=states(), gain=st.floats(1.0, 1e4))
-def test_pure_brake_stays_straight(arm, dynamics, state, gain):
+def test_pure_brake_stays_straight(
+    arm: Arm, dynamics: InverseDynamics, state: State, gain: float
+) -> None:
     q, v = at(arm, dynamics, state)
     assume((np.abs(arm.nonlinear_effects(q, v)) < arm.limits.effort).all())
     a = acceleration(arm, q, v, dynamics.torque(-gain * v, np.zeros(arm.nv)))
@@ -77,8 +92,11 @@ def test_pure_brake_stays_straight(arm, dynamics, state, gain):
     assert -a @ v == pytest.approx(np.linalg.norm(a) * np.linalg.norm(v), abs=1e-5)
 
 
+@settings(max_examples=40)
 @given(state=states(), attract=vectors(7, 1e4))
-def test_attraction_is_scaled_before_the_brake(arm, dynamics, state, attract):
+def test_attraction_is_scaled_before_the_brake(
+    arm: Arm, dynamics: InverseDynamics, state: State, attract: Array
+) -> None:
     """Where the limits allow the brake in full, it acts in full."""
     q, v = at(arm, dynamics, state)
     brake = -v / max(np.abs(v / arm.limits.acceleration).max(), 1.0)
@@ -93,7 +111,22 @@ def test_attraction_is_scaled_before_the_brake(arm, dynamics, state, attract):
     assert (np.abs(a) <= arm.limits.acceleration * (1 + 1e-6) + 1e-6).all()
 
 
+@settings(max_examples=40)
 @given(state=states())
-def test_mass_matrix(arm, dynamics, state):
+def test_mass_matrix(arm: Arm, dynamics: InverseDynamics, state: State) -> None:
     q, _ = at(arm, dynamics, state)
-    np.testing.assert_array_equal(dynamics.mass_matrix(), arm.mass_matrix(q))
+    mass = dynamics.mass_matrix()
+    np.testing.assert_array_equal(mass, mass.T)
+    np.testing.assert_allclose(mass, arm.mass_matrix(q), rtol=0, atol=1e-13)
+
+
+@settings(max_examples=40)
+@given(state=states(), shortest=st.sampled_from([0.001, 0.05]))
+def test_a_brake_is_no_harder_than_its_duration_and_no_shorter_than_that_allows(
+    arm: Arm, dynamics: InverseDynamics, state: State, shortest: float
+) -> None:
+    _, v = at(arm, dynamics, state)
+    held = np.zeros(arm.nv)
+    for duration, used in ((0.5, 0.5), (1e-9, shortest), (np.inf, shortest)):
+        tau = dynamics.brake_torque(v, duration, shortest)
+        np.testing.assert_array_equal(tau, dynamics.torque(-v / used, held))

@@ -1,53 +1,84 @@
-"""A joint space of bounded and circle joints, without a robot."""
+"""Joint spaces of any joints, an obstacle in the plane, and the two-link arm between its balls."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass
-from types import SimpleNamespace
+from collections.abc import Callable, Sequence
+from functools import cache
+from typing import Any
 
 import numpy as np
 import pytest
 
-from densarm.arrays import Array
+from densarm.arms.arm import Arm
+from densarm.arms.description import RobotDescription
+from densarm.density.goal_distance import TorusDistance
+from densarm.density.navigation_density import DensityParameters
+from densarm.density.sub_goals import GuidedDensity, GuidePath, SubGoals
+from densarm.density.unsafe_sets import SensingParameters
+from densarm.planning.guide import NoPath
+from densarm.planning.path_guide import PathGuide
+from densarm.scenarios.scenario import Scenario
+from densarm.scene.scene import Scene
+from densarm.values.arrays import Array
+from densarm.world.swept_check import SweptCheck
+from densarm.world.world import World
+
+NO_LIMIT = 1e15  # [m], which an arm takes for none
+KINDS = {"b": "prismatic", "c": "continuous"}
+LINK = """<link name="{name}"><inertial><mass value="1"/>
+<inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial>{body}</link>"""
+BALL = '<collision><geometry><sphere radius="0.1"/></geometry></collision>'
+JOINT = """<joint name="{name}" type="{kind}"><parent link="{parent}"/><child link="{child}"/>
+<axis xyz="{axis}"/><limit lower="{lower}" upper="{upper}" effort="50" velocity="1"/></joint>"""
 
 
-@dataclass
-class JointSpace:
-    """What the density reads of an arm: one letter per joint, b(ounded) or c(ircle)."""
-
-    kinds: str
-    lower: Sequence[float] = ()
-    upper: Sequence[float] = ()
-
-    def __post_init__(self):
-        self.is_circle = np.array([kind == "c" for kind in self.kinds])
-        sizes = np.where(self.is_circle, 2, 1)
-        self.idx_q = np.cumsum(sizes) - sizes
-        self.nq, self.nv = int(sizes.sum()), len(self.kinds)
-        free = np.full(self.nv, np.inf)
-        self.limits = SimpleNamespace(
-            lower=np.array(self.lower) if len(self.lower) else -free,
-            upper=np.array(self.upper) if len(self.upper) else free,
+@cache
+def _joints(kinds: str, lower: tuple[float, ...], upper: tuple[float, ...]) -> Arm:
+    text = LINK.format(name="link0", body=BALL)
+    for k, kind in enumerate(kinds):
+        text += LINK.format(name=f"link{k + 1}", body="")
+        text += JOINT.format(
+            name=f"joint{k + 1}",
+            kind=KINDS[kind],
+            parent=f"link{k}",
+            child=f"link{k + 1}",
+            axis="0 0 1",
+            lower=lower[k] if lower else -NO_LIMIT,
+            upper=upper[k] if upper else NO_LIMIT,
         )
-
-    def configuration(self, angles) -> Array:
-        q = np.zeros(self.nq)
-        q[self.idx_q] = np.where(self.is_circle, np.cos(angles), angles)
-        circle = self.idx_q[self.is_circle]
-        q[circle + 1] = np.sin(np.asarray(angles)[self.is_circle])
-        return q
-
-    def angles(self, q) -> Array:
-        angles = q[self.idx_q].copy()
-        circle = self.idx_q[self.is_circle]
-        angles[self.is_circle] = np.arctan2(q[circle + 1], q[circle])
-        return angles
-
-    def integrate(self, q, step) -> Array:
-        return self.configuration(self.angles(q) + step)
+    return Arm(RobotDescription(name="joints", urdf=f'<robot name="joints">{text}</robot>'))
 
 
-def central_difference(function, q, nv, integrate=np.add, step=1e-6) -> Array:
-    """Gradient of a scalar function along `integrate`."""
+@pytest.fixture(scope="session")
+def joint_space() -> Callable[..., Arm]:
+    """Return arms by one letter per joint, b(ounded) or c(ontinuous), and their limits, if any."""
+
+    def make(kinds: str, lower: Sequence[float] = (), upper: Sequence[float] = ()) -> Arm:
+        return _joints(kinds, tuple(lower), tuple(upper))
+
+    return make
+
+
+@pytest.fixture(scope="session")
+def ball_on_slides() -> Arm:
+    """A ball of 0.1 m that two slides carry in a plane, which is its joint space."""
+    links = LINK.format(name="base", body="") + LINK.format(name="bridge", body="")
+    joints = [("along", "base", "bridge", "1 0 0"), ("across", "bridge", "ball", "0 1 0")]
+    slides = "".join(
+        JOINT.format(
+            name=name, kind="prismatic", parent=parent, child=child, axis=axis, lower=-1, upper=1
+        )
+        for name, parent, child, axis in joints
+    )
+    urdf = f'<robot name="slides">{links}{LINK.format(name="ball", body=BALL)}{slides}</robot>'
+    return Arm(RobotDescription(name="slides", urdf=urdf))
+
+
+def central_difference(
+    function: Callable[[Array], float],
+    q: Array,
+    nv: int,
+    integrate: Callable[[Array, Array], Array] = np.add,
+    step: float = 1e-6,
+) -> Array:
     return np.array(
         [
             (function(integrate(q, axis)) - function(integrate(q, -axis))) / (2 * step)
@@ -57,20 +88,44 @@ def central_difference(function, q, nv, integrate=np.add, step=1e-6) -> Array:
 
 
 @pytest.fixture(scope="session")
-def joint_space():
-    return JointSpace
-
-
-@pytest.fixture(scope="session")
-def numerical_gradient():
+def numerical_gradient() -> Callable[..., Array]:
+    """Return the gradient of a scalar function along `integrate`, by central differences."""
     return central_difference
 
 
 @pytest.fixture(scope="session")
-def disc():
+def disc() -> tuple[Callable[[Array], tuple[float, Array]], Callable[[Array], tuple[float, Array]]]:
     """h and s of the disc of radius 1 with sensing radius 2, on a squared scale."""
 
-    def squared_radius(offset):
+    def squared_radius(offset: float) -> Callable[[Array], tuple[float, Array]]:
         return lambda x: (float(x @ x - offset), 2.0 * x)
 
     return squared_radius(1.0), squared_radius(4.0)
+
+
+@pytest.fixture(scope="session")
+def make_guided(swing_up: Scenario) -> Callable[..., GuidedDensity]:
+    """Return a maker of guided densities in swing_up: by guide, start, goal and parameters."""
+
+    def make(
+        guide: str = "path",
+        start: Sequence[float] | None = None,
+        goal: Sequence[float] | None = None,
+        scene: Scene | None = None,
+        margin: float = 0.0,
+        **parameters: Any,
+    ) -> GuidedDensity:
+        arm = swing_up.arm
+        check = SweptCheck(World(arm, swing_up.scene if scene is None else scene), margin)
+        ends = (
+            swing_up.start if start is None else arm.configuration(start),
+            swing_up.goal if goal is None else arm.configuration(goal),
+        )
+        path: GuidePath | NoPath = GuidePath(np.stack(ends), is_clear=False)
+        if guide != "direct":
+            path = PathGuide(arm, check).plan(*ends, 0)
+        assert isinstance(path, GuidePath)
+        goals = SubGoals(check, path, SensingParameters())
+        return GuidedDensity(check, goals, TorusDistance(arm), DensityParameters(**parameters))
+
+    return make

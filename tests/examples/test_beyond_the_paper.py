@@ -2,31 +2,39 @@
 
 import json
 import runpy
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import pytest
 
+pytestmark = pytest.mark.slow
+
 SCRIPTS = Path(__file__).parents[2] / "examples" / "paper"
+
+RunMain = Callable[..., dict[str, Any]]
 
 
 @pytest.fixture
-def run(tmp_path, monkeypatch):
+def run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> RunMain:
     """Return a runner of a script's main with few starts and other constants: its result."""
     monkeypatch.syspath_prepend(str(SCRIPTS))
 
-    def run_main(name, starts, pictures, **constants):
+    def run_main(name: str, starts: int, pictures: list[str], **constants: Any) -> dict[str, Any]:
         main = runpy.run_path(str(SCRIPTS / f"{name}.py"))["main"]
         main.__globals__.update(constants)
         main(["--out", str(tmp_path), "--starts", str(starts)])
         for picture in pictures:
             for kind in ("png", "pdf"):
                 assert (tmp_path / f"{picture}.{kind}").stat().st_size > 10_000
-        return json.loads((tmp_path / "result.json").read_text(encoding="utf-8"))
+        text = (tmp_path / "result.json").read_text(encoding="utf-8")
+        result: dict[str, Any] = json.loads(text)
+        return result
 
     return run_main
 
 
-def test_slower_obstacles_enter_none_and_faster_ones_some(run):
+def test_slower_obstacles_enter_none_and_faster_ones_some(run: RunMain) -> None:
     result = run(
         "moving_scene",
         16,
@@ -45,7 +53,7 @@ def test_slower_obstacles_enter_none_and_faster_ones_some(run):
     assert result["numbers"]["unbounded_control_in_continuous_time"]["entered"] == 0
 
 
-def test_where_rantzers_condition_holds_everywhere_starts_enter(run):
+def test_where_rantzers_condition_holds_everywhere_starts_enter(run: RunMain) -> None:
     result = run(
         "rantzer",
         40,
@@ -67,7 +75,7 @@ def test_where_rantzers_condition_holds_everywhere_starts_enter(run):
     assert [each["entered"] for each in standing] == [0, 0, 0]
 
 
-def test_distances_hold_but_for_a_region_that_does_not_enclose_its_set(run):
+def test_distances_hold_but_for_a_region_that_does_not_enclose_its_set(run: RunMain) -> None:
     main = runpy.run_path(str(SCRIPTS / "assumptions.py"))
     chosen = [each for each in main["scenes"]() if each.name in ("3", "5, r = 2.5")]
     result = run(

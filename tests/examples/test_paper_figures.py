@@ -18,8 +18,10 @@ STARTS = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", STARTS)
-def test_claim_holds(name, tmp_path):
+def test_claim_holds(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.syspath_prepend(str(SCRIPTS))
     main = runpy.run_path(str(SCRIPTS / f"{name}.py"))["main"]
     main(["--out", str(tmp_path), "--starts", str(STARTS[name])])
     result = json.loads((tmp_path / "result.json").read_text(encoding="utf-8"))

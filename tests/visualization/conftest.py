@@ -8,6 +8,7 @@ import time
 import urllib.request
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
+from dataclasses import replace
 from io import BytesIO
 from pathlib import Path
 from typing import Any
@@ -18,12 +19,13 @@ from numpy.typing import NDArray
 from PIL import Image
 from websockets.sync.client import ClientConnection, connect
 
-from densarm.arm import Arm, load_arm
-from densarm.clearance import Clearance
-from densarm.outcome import Outcome
-from densarm.scenario import Scenario
-from densarm.scene import Box, Capsule, Cylinder, Scene, Sphere
-from densarm.trajectory import Trajectory
+from densarm.arms.arm import Arm, load_arm
+from densarm.certificates.task import Task
+from densarm.scene.obstacles import Box, Capsule, Cylinder, Sphere
+from densarm.scene.scene import Scene
+from densarm.simulation.run import Run
+from densarm.values.outcome import Outcome
+from densarm.world.world import World
 
 SCENE = Scene(
     [
@@ -50,19 +52,19 @@ FLAGS = (
 )
 
 
-def record(arm: Arm, angles: NDArray[np.float64], duration: float, scene: Scene) -> Trajectory:
+def record(arm: Arm, angles: NDArray[np.float64], duration: float, scene: Scene) -> Run:
     """A record of joint positions (N, nv) at equal steps of time, to the last of them."""
     time = np.linspace(0.0, duration, len(angles))
     q = arm.configurations(angles)
-    scenario = Scenario("swing", "Swing <b> & co", arm, scene, start=q[0], goal=q[-1])
-    clearance = Clearance(arm, scene)
+    task = Task(arm, scene, q[0], q[-1], name="swing", title="Swing <b> & co")
+    world = World(arm, scene)
     rest = np.zeros((len(q), arm.nv))
-    smallest = [clearance.distances(each).min(initial=np.inf) for each in q]
-    return Trajectory(scenario, time, q, rest, rest, np.array(smallest), Outcome.TIMED_OUT, "late")
+    smallest = [world.distances(each).min(initial=np.inf) for each in q]
+    return Run(task, time, q, rest, rest, np.array(smallest), Outcome.TIMED_OUT, "late")
 
 
 @pytest.fixture(scope="session", name="record")
-def record_fixture() -> Callable[..., Trajectory]:
+def record_fixture() -> Callable[..., Run]:
     return record
 
 
@@ -72,16 +74,22 @@ def two_link() -> Arm:
 
 
 @pytest.fixture(scope="session")
-def swing(two_link: Arm) -> Trajectory:
+def swing(two_link: Arm) -> Run:
     """The two-link arm swings among obstacles of every kind."""
     angle = np.linspace(0.0, 0.8 * np.pi, 401)
     return record(two_link, np.column_stack([angle, -0.5 * angle]), DURATION, SCENE)
 
 
 @pytest.fixture(scope="session")
-def resting(two_link: Arm) -> Trajectory:
+def resting(two_link: Arm) -> Run:
     """One sample of an arm that has nothing around it."""
     return record(two_link, np.array([[0.3, 0.3]]), 0.0, Scene())
+
+
+@pytest.fixture(scope="session")
+def aimless(swing: Run) -> Run:
+    """The swing, of a controller that has no goal."""
+    return replace(swing, task=replace(swing.task, goal=None))
 
 
 class Page:
@@ -98,10 +106,11 @@ class Page:
         number = next(self._number)
         self._connection.send(json.dumps({"id": number, "method": method, "params": params}))
         while True:
-            message = json.loads(self._connection.recv(timeout=PATIENCE))
+            message: dict[str, Any] = json.loads(self._connection.recv(timeout=PATIENCE))
             if message.get("id") == number:
                 assert "error" not in message, message
-                return message["result"]
+                result: dict[str, Any] = message["result"]
+                return result
             self.events.append(message)
 
     def open(self, url: str) -> None:

@@ -5,14 +5,16 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from densarm.attachment import Attachment
-from densarm.scene import HalfSpace, Mesh, Scene, Sphere
+from densarm.arms.arm import Arm
+from densarm.scene.mesh import Mesh
+from densarm.scene.obstacles import HalfSpace, Sphere
+from densarm.scene.scene import Attachment, Scene
 from densarm.visualization.bodies import WORLD, arm_bodies, obstacle_bodies, sensing_bodies
 
 TETRAHEDRON = ((0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
 
-def test_half_space_is_a_board_below_its_surface():
+def test_half_space_is_a_board_below_its_surface() -> None:
     wall = HalfSpace(name="wall", normal=(2.0, 0.0, 0.0), offset=-0.3, position=(1.0, 5.0, 5.0))
     (board,) = obstacle_bodies(Scene([wall]))
     corners = board.mesh.vertices @ board.placement.rotation.T + board.placement.translation
@@ -20,16 +22,16 @@ def test_half_space_is_a_board_below_its_surface():
     assert high[0] == pytest.approx(0.7)
     assert (high - low)[1:].min() > 100 * (high - low)[0]
     assert not board.has_end
-    assert sensing_bodies(Scene([wall]), 0.1) == ()
+    assert sensing_bodies([board], 0.1) == ()
 
 
-def test_each_piece_of_a_mesh_is_drawn():
+def test_each_piece_of_a_mesh_is_drawn() -> None:
     pieces = obstacle_bodies(Scene([Mesh(name="mug", pieces=(TETRAHEDRON, TETRAHEDRON))]))
     assert [piece.name for piece in pieces] == ["mug.0", "mug.1"]
     assert all(piece.joint == WORLD and piece.has_end for piece in pieces)
 
 
-def test_held_body_moves_with_its_link(two_link):
+def test_held_body_moves_with_its_link(two_link: Arm) -> None:
     ball = Sphere(name="ball", radius=0.1, position=(0.0, 0.0, -0.5))
     arm = two_link.holding(Attachment(ball, "lower_link"))
     (held,) = [body for body in arm_bodies(arm) if body.name == "ball"]

@@ -1,11 +1,12 @@
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from numpy.typing import NDArray
 
-from densarm.scene import Box, Scene
+from densarm.scene.obstacles import Box
+from densarm.scene.scene import Scene
 from densarm.visualization.bodies import obstacle_bodies
 from densarm.visualization.camera import FIELD_OF_VIEW, Camera
 
@@ -13,6 +14,7 @@ POINTS = arrays(np.float64, st.tuples(st.integers(2, 12), st.just(3)), elements=
 
 
 @given(POINTS)
+@example(np.array([[0.0, 3.0, 0.0], [3.0, 0.0, 2.0]]))  # one behind the other
 def test_every_point_is_in_the_picture(points: NDArray[np.float64]) -> None:
     camera = Camera.facing(points)
     if not np.any(np.ptp(points, axis=0) > 1e-3):
@@ -35,7 +37,7 @@ def test_planar_arm_is_seen_from_the_front() -> None:
 
 
 @pytest.mark.parametrize("side", [-1.0, 1.0])
-def test_camera_looks_past_a_wall(side):
+def test_camera_looks_past_a_wall(side: float) -> None:
     cloud = np.array([[x, y, z] for x in (0.0, 1.0) for y in (0.0, 1.0) for z in (0.0, 1.0)])
     wall = Box(name="wall", size=(4.0, 0.05, 4.0), position=(0.5, 0.5 + side, 0.5))
     camera = Camera.facing(cloud, cloud, obstacle_bodies(Scene([wall])))

@@ -1,15 +1,20 @@
+import threading
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
+from urllib.request import urlopen
 
 import numpy as np
 import pytest
 
-from densarm.arm import load_arm
+from densarm.arms.arm import load_arm
 from densarm.errors import DensarmError
-from densarm.scene import Scene
-from densarm.trajectory import Trajectory
-from densarm.visualization.view import save_html
+from densarm.scene.scene import Scene
+from densarm.simulation.run import Run
+from densarm.visualization import html_page as module
+from densarm.visualization.html_page import PageServer, html_page, save_html
+
+pytestmark = pytest.mark.slow  # pages in Chromium
 
 OBSTACLES = ("ball", "box", "capsule", "cylinder")
 DURATION = 4.0  # [s]
@@ -17,7 +22,7 @@ DURATION = 4.0  # [s]
 
 @pytest.fixture(scope="module")
 def page(
-    open_page: Callable[[str], Any], swing: Trajectory, tmp_path_factory: pytest.TempPathFactory
+    open_page: Callable[[str], Any], swing: Run, tmp_path_factory: pytest.TempPathFactory
 ) -> Any:
     """The page of a swing, opened from disk and paused."""
     file = tmp_path_factory.mktemp("page") / "swing.html"
@@ -55,7 +60,7 @@ def test_legend_shows_and_hides(page: Any, part: str) -> None:
     assert np.array_equal(page.picture(), before)
 
 
-def test_time_line_moves_the_arm_and_the_closest_pair(page: Any, swing: Trajectory) -> None:
+def test_time_line_moves_the_arm_and_the_closest_pair(page: Any, swing: Run) -> None:
     page.evaluate("seek(0)")
     scrub = f"slider.value = {DURATION / 2}; slider.dispatchEvent(new Event('input'))"
     assert changed(page, scrub) > 100
@@ -122,7 +127,7 @@ CORNERS_IN_PICTURE = """(() => {
 
 
 def test_single_sample_without_pairs(
-    open_page: Callable[[str], Any], resting: Trajectory, tmp_path: Path
+    open_page: Callable[[str], Any], resting: Run, tmp_path: Path
 ) -> None:
     save_html(resting, tmp_path / "a.html")
     page = open_page((tmp_path / "a.html").as_uri())
@@ -136,13 +141,25 @@ def test_single_sample_without_pairs(
     assert page.complaints() == []
 
 
-def test_missing_folder(resting: Trajectory, tmp_path: Path) -> None:
+def test_without_a_goal_the_legend_has_none(
+    open_page: Callable[[str], Any], aimless: Run, tmp_path: Path
+) -> None:
+    save_html(aimless, tmp_path / "a.html")
+    page = open_page((tmp_path / "a.html").as_uri())
+    page.wait_until("playing && time > 0")
+    shown = "[...document.querySelectorAll('#legend label')].filter(row => row.offsetParent)"
+    words = page.evaluate(f"{shown}.map(row => row.textContent.trim().split(' ')[0])")
+    assert words == ["obstacles", "sensed"]
+    assert page.complaints() == []
+
+
+def test_missing_folder(resting: Run, tmp_path: Path) -> None:
     with pytest.raises(DensarmError, match="No such file or directory"):
         save_html(resting, tmp_path / "missing" / "run.html")
 
 
 def test_failure_leaves_the_old_file(
-    resting: Trajectory, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    resting: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     file = tmp_path / "run.html"
     file.write_text("old")
@@ -157,8 +174,52 @@ def test_failure_leaves_the_old_file(
     assert file.read_text() == "old"
 
 
-def test_panda_fits_into_five_megabytes(record: Callable[..., Trajectory], tmp_path: Path) -> None:
+def test_panda_fits_into_five_megabytes(record: Callable[..., Run], tmp_path: Path) -> None:
     arm = load_arm("panda")
     ready = arm.angles(arm.postures["ready"])
     save_html(record(arm, np.array([ready, ready + 0.1]), 1.0, Scene()), tmp_path / "a.html")
     assert (tmp_path / "a.html").stat().st_size < 5e6
+
+
+def test_served_page_plays(open_page: Callable[[str], Any], swing: Run) -> None:
+    with PageServer(html_page(swing)) as server:
+        thread = threading.Thread(target=server.serve_forever)
+        thread.start()
+        try:
+            page = open_page(server.url)
+            page.wait_until("playing && time > 0")
+            before = page.picture()
+            page.wait_until("time > 0.3")
+            moved = np.abs(page.picture() - before).max(axis=2) > 8
+            assert (
+                moved[: page.evaluate("document.querySelector('#timeline').offsetTop")].sum() > 100
+            )
+            assert page.complaints() == []
+            assert {url for url in page.requests() if "http" in url} == {server.url}
+        finally:
+            server.shutdown()
+            thread.join()
+
+
+def test_page_is_for_this_machine_alone_and_ends_with_ctrl_c(
+    resting: Run, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    urls: list[str] = []
+    monkeypatch.setattr("webbrowser.open", urls.append)
+
+    def serve(server: PageServer) -> None:
+        thread = threading.Thread(target=server.handle_request)
+        thread.start()
+        with urlopen(server.url, timeout=30) as answer:
+            assert answer.read().decode() == server.page.decode()
+        thread.join()
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(PageServer, "serve_forever", serve)
+    with pytest.raises(KeyboardInterrupt):
+        module.view(resting, on_url=urls.append)
+    assert urls[0] == urls[1]
+    assert urls[0].startswith("http://127.0.0.1:")
+    with pytest.raises(OSError, match="refused"):
+        urlopen(urls[0], timeout=30)
+    assert capfd.readouterr() == ("", "")

@@ -1,3 +1,4 @@
+from collections.abc import Callable
 from typing import Any
 
 import meshcat
@@ -5,11 +6,13 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from densarm.arm import Arm
-from densarm.robot.robot_description import RobotDescription
-from densarm.scene import Scene
+from densarm.arms.arm import Arm
+from densarm.arms.description import RobotDescription
+from densarm.scene.scene import Scene
+from densarm.simulation.run import Run
+from densarm.values.arrays import Array
 from densarm.visualization.meshcat_drawing import draw
-from densarm.visualization.stage import Stage
+from densarm.visualization.render_scene import RenderScene
 
 NO_VISUALS = """
 <robot name="bare">
@@ -42,36 +45,36 @@ class Window:
     def of_type(self, kind: str) -> dict[str, dict[str, Any]]:
         return {c["path"]: c for c in self.commands if c["type"] == kind}
 
-    def place(self, path: str) -> np.ndarray:
+    def place(self, path: str) -> Array:
         return np.reshape(self.of_type("set_transform")[path]["matrix"], (4, 4)).T
 
 
-def drawn(stage):
+def drawn(scene: RenderScene) -> Window:
     window = Window()
-    draw(stage, meshcat.Visualizer(window=window))
+    draw(scene, meshcat.Visualizer(window=window))
     return window
 
 
 @pytest.fixture(scope="module")
-def stage(swing):
-    return Stage(swing)
+def scene(swing: Run) -> RenderScene:
+    return RenderScene(swing)
 
 
 @pytest.fixture(scope="module")
-def window(stage):
-    return drawn(stage)
+def window(scene: RenderScene) -> Window:
+    return drawn(scene)
 
 
-def test_links_without_visuals_show_their_collision_shapes(record):
+def test_links_without_visuals_show_their_collision_shapes(record: Callable[..., Run]) -> None:
     arm = Arm(RobotDescription(name="bare", urdf=NO_VISUALS))
-    objects = drawn(Stage(record(arm, np.zeros((2, 1)), 1.0, Scene()))).of_type("set_object")
+    objects = drawn(RenderScene(record(arm, np.zeros((2, 1)), 1.0, Scene()))).of_type("set_object")
     assert sorted(path for path in objects if "/robot/" in path) == [
         "/meshcat/robot/turn/arm_0",
         "/meshcat/robot/universe/base_0",
     ]
 
 
-def test_goal_shares_the_meshes_of_the_robot(window):
+def test_goal_shares_the_meshes_of_the_robot(window: Window) -> None:
     objects = {path: c["object"] for path, c in window.of_type("set_object").items()}
     goal = {path: item for path, item in objects.items() if "/goal/" in path}
     assert goal
@@ -81,28 +84,42 @@ def test_goal_shares_the_meshes_of_the_robot(window):
         assert item["materials"][0]["transparent"]
 
 
-def test_obstacles_and_their_sensing_regions_stand_where_the_scene_says(window, swing):
-    for obstacle in swing.scenario.scene:
+def test_without_a_goal_there_is_no_ghost(aimless: Run) -> None:
+    objects = drawn(RenderScene(aimless)).of_type("set_object")
+    assert any("/robot/" in path for path in objects)
+    assert not any("/goal/" in path for path in objects)
+
+
+def test_obstacles_and_their_sensing_regions_stand_where_the_scene_says(
+    window: Window, swing: Run
+) -> None:
+    for obstacle in swing.task.scene:
         for group in ("obstacles", "sensing"):
             place = window.place(f"/meshcat/{group}/{obstacle.name}")
             np.testing.assert_allclose(place[:3, 3], obstacle.position)
 
 
-def test_arm_starts_at_the_first_frame_and_the_ghost_is_at_the_goal(window, swing, two_link):
-    for group, q in (("robot", swing.q[0]), ("goal", swing.scenario.goal)):
+def test_arm_starts_at_the_first_frame_and_the_ghost_is_at_the_goal(
+    window: Window, swing: Run, two_link: Arm
+) -> None:
+    goal = swing.task.goal
+    assert goal is not None
+    for group, q in (("robot", swing.q[0]), ("goal", goal)):
         (shoulder, _) = two_link.angles(q)
         elbow = window.place(f"/meshcat/{group}/elbow")[:3, 3]
         np.testing.assert_allclose(elbow, [np.sin(shoulder), 0, -np.cos(shoulder)], atol=1e-9)
 
 
-def test_animation_has_the_pose_of_every_joint_at_every_frame(window, stage, two_link):
+def test_animation_has_the_pose_of_every_joint_at_every_frame(
+    window: Window, scene: RenderScene, two_link: Arm
+) -> None:
     (command,) = (c for c in window.commands if c["type"] == "set_animation")
     clips = {c["path"]: c["clip"]["tracks"] for c in command["animations"]}
     position, quaternion = clips["/meshcat/robot/elbow"]
-    assert [key["time"] for key in position["keys"]] == stage.time.tolist()
-    angles = two_link.angles(stage.q)
+    assert [key["time"] for key in position["keys"]] == scene.time.tolist()
+    angles = two_link.angles(scene.q)
     places = np.array([key["value"] for key in position["keys"]])
     np.testing.assert_allclose(places[:, 0], np.sin(angles[:, 0]), atol=1e-9)
     turns = [pin.Quaternion(np.array(key["value"])).matrix() for key in quaternion["keys"]]
-    expected = [stage.joint_poses(q)[2].rotation for q in stage.q]
+    expected = [scene.joint_poses(q)[2].rotation for q in scene.q]
     np.testing.assert_allclose(turns, expected, atol=1e-9)

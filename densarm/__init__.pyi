@@ -1,0 +1,65 @@
+"""The public names of densarm: `densarm` itself reads them here."""
+
+from .arms.arm import Arm as Arm
+from .arms.arm import load_arm as load_arm
+from .arms.free_body import free_body as free_body
+from .certificates.certificate import Certificate as Certificate
+from .certificates.task import SimulationParameters as SimulationParameters
+from .control.controller import Controller as Controller
+from .control.controller import Gains as Gains
+from .control.regulation import DensityRegulation as DensityRegulation
+from .control.speed_law import SpeedParameters as SpeedParameters
+from .control.state_observer import Tolerances as Tolerances
+from .control.supervisor import Fault as Fault
+from .control.supervisor import Supervisor as Supervisor
+from .control.tracking import DensityTracking as DensityTracking
+from .density.goal_distance import GoalDistance as GoalDistance
+from .density.goal_distance import TorusDistance as TorusDistance
+from .density.navigation_density import DensityParameters as DensityParameters
+from .density.navigation_density import Gauge as Gauge
+from .density.navigation_density import NavigationDensity as NavigationDensity
+from .density.navigation_density import density_towards as density_towards
+from .density.sub_goals import GuidePath as GuidePath
+from .density.unsafe_sets import SensingParameters as SensingParameters
+from .density.unsafe_sets import UnsafeSet as UnsafeSet
+from .errors import DensarmError as DensarmError
+from .errors import FileContentError as FileContentError
+from .errors import InvalidValueError as InvalidValueError
+from .errors import RobotDescriptionError as RobotDescriptionError
+from .errors import SceneChangedError as SceneChangedError
+from .errors import UnknownNameError as UnknownNameError
+from .planning.guide import Guide as Guide
+from .planning.guide import NoPath as NoPath
+from .planning.motion import Motion as Motion
+from .planning.motion import PlanningError as PlanningError
+from .planning.motion import TimingParameters as TimingParameters
+from .planning.path_guide import PathGuideParameters as PathGuideParameters
+from .planning.plan import plan_motion as plan_motion
+from .planning.plan import plan_path as plan_path
+from .scenarios.run import run as run
+from .scenarios.scenario import Scenario as Scenario
+from .scenarios.scenario import load_scenario as load_scenario
+from .scene.loading import load_problems as load_problems
+from .scene.loading import load_scene as load_scene
+from .scene.mesh import Mesh as Mesh
+from .scene.obstacles import Box as Box
+from .scene.obstacles import Capsule as Capsule
+from .scene.obstacles import Cylinder as Cylinder
+from .scene.obstacles import HalfSpace as HalfSpace
+from .scene.obstacles import Sphere as Sphere
+from .scene.scene import Attachment as Attachment
+from .scene.scene import Scene as Scene
+from .simulation.plants import Plant as Plant
+from .simulation.plants import SingleIntegrator as SingleIntegrator
+from .simulation.run import Run as Run
+from .simulation.simulate import simulate as simulate
+from .values.outcome import Outcome as Outcome
+from .visualization.html_page import save_html as save_html
+from .visualization.html_page import view as view
+from .visualization.picture import save_animation as save_animation
+from .visualization.picture import save_picture as save_picture
+from .visualization.plots import save_plot as save_plot
+from .world.world import World as World
+
+__all__: list[str]
+__version__: str

@@ -1,0 +1,119 @@
+"""RobotDescription: everything that an arm is built from, as plain data."""
+
+import importlib.metadata
+import xml.etree.ElementTree as ElementTree
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import asdict, dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+from densarm.errors import DensarmError, RobotDescriptionError
+from densarm.scene.scene import Attachment
+from densarm.values.arrays import Vector
+from densarm.values.checks import one_of
+
+DATA_WHEEL = "example-robot-data"
+"""Prefix ``example-robot-data:`` of a path inside that wheel's folder of robots."""
+
+
+@dataclass(frozen=True)
+class RobotDescription:
+    """URDF and SRDF as text, with what Pinocchio needs beside them.
+
+    Holding text, not paths, lets a recorded run rebuild its own arm. Sequences are kept as tuples.
+
+    Raises:
+        InvalidValueError: shapes of another name, or links of another name to collide as drawn.
+    """
+
+    name: str
+    urdf: str
+    """The URDF's text."""
+    srdf: str | None = None
+    """The SRDF's text; None where there is none."""
+    package_dirs: Sequence[str] = ()
+    """Folders that ``package://`` and relative mesh paths are looked up in."""
+    locked_joints: Mapping[str, float] = field(default_factory=dict)
+    """Joint name to its fixed position [rad or m]; may lie outside the joint's limits."""
+    base_placement: Vector = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
+    """Pose of the base in the world: x y z [m], quaternion x y z w."""
+    acceleration: Vector | None = None
+    """Acceleration limits (nv,) [rad/s² or m/s²]; None for the default on every joint."""
+    end_effector: str | None = None
+    """Frame whose path is drawn; None for the last link."""
+    postures: Mapping[str, Vector] = field(default_factory=dict)
+    """Named joint positions, one number per joint [rad or m]."""
+    shapes: str = "hull"
+    """What distances are measured to: each "hull", or the smallest "capsule" around it."""
+    collision_from_visual: str = "missing"
+    """Which links collide as drawn: "never", those "missing" collision geometry, or "always"."""
+    attachments: Sequence[Attachment] = ()
+    """Bodies that the arm holds."""
+
+    def __post_init__(self) -> None:
+        one_of("shapes", self.shapes, ["hull", "capsule"])
+        drawn = ["never", "missing", "always"]
+        one_of("collision_from_visual", self.collision_from_visual, drawn)
+        for key in ("package_dirs", "base_placement", "acceleration", "attachments"):
+            object.__setattr__(self, key, _frozen(getattr(self, key)))
+        postures = {name: _frozen(angles) for name, angles in self.postures.items()}
+        object.__setattr__(self, "postures", postures)
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the description as JSON data; `from_json` is its inverse."""
+        attachments = [item.to_json() for item in self.attachments]
+        return {**asdict(replace(self, attachments=())), "attachments": attachments}
+
+    @classmethod
+    def from_json(cls, data: Mapping[str, Any]) -> "RobotDescription":
+        """Rebuild a description from the data of `to_json`.
+
+        Raises:
+            DensarmError: a field is missing or unknown, or an attachment is not one.
+        """
+        try:
+            if absent := [key for key in _ALWAYS_RECORDED if key not in data]:
+                raise KeyError(absent[0])
+            # Absent from what earlier versions wrote.
+            values = {"collision_from_visual": "never", "attachments": (), **data}
+            values["attachments"] = [Attachment.from_json(item) for item in values["attachments"]]
+            return cls(**values)
+        except (TypeError, KeyError, AttributeError, ValueError) as error:
+            raise DensarmError(f"robot description: {error}") from None
+
+
+_ALWAYS_RECORDED = ("postures", "package_dirs", "base_placement", "acceleration")
+
+
+def _frozen(values: Any) -> Any:
+    return tuple(values) if isinstance(values, Iterable) else values
+
+
+def data_wheel_folder() -> Path:
+    """Return the share folder of the example-robot-data wheel, which must be installed."""
+    try:
+        distribution = importlib.metadata.distribution(DATA_WHEEL)
+    except importlib.metadata.PackageNotFoundError:
+        raise RobotDescriptionError(
+            f"the package {DATA_WHEEL!r} is not installed: pip install {DATA_WHEEL}"
+        ) from None
+    return Path(str(distribution.locate_file("cmeel.prefix/share")))
+
+
+def resolve_path(path: str, beside: Path) -> Path:
+    """Return the file that a path of an ``arm.toml`` names, beside it or in the data wheel."""
+    prefix, _, rest = path.partition(":")
+    if prefix == DATA_WHEEL:
+        return data_wheel_folder() / DATA_WHEEL / "robots" / rest
+    return beside / path
+
+
+def parse_robot_xml(text: str, kind: str) -> ElementTree.Element:
+    """Return the root ``<robot>`` of a text, whose kind is "URDF" or "SRDF" for errors."""
+    try:
+        root = ElementTree.fromstring(text)
+    except ElementTree.ParseError as error:
+        raise RobotDescriptionError(f"{kind}: not well-formed XML ({error})") from None
+    if root.tag != "robot":
+        raise RobotDescriptionError(f"{kind}: the root element is <{root.tag}>, not <robot>")
+    return root

@@ -1,0 +1,248 @@
+"""Joints of an arm: their limits, which of a URDF's move, where the others stand."""
+
+import xml.etree.ElementTree as ElementTree
+from collections.abc import Collection, Iterable, Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+
+from densarm.arms.description import RobotDescription, parse_robot_xml
+from densarm.arms.urdf import Urdf
+from densarm.errors import InvalidValueError, RobotDescriptionError, UnknownNameError
+from densarm.values.arrays import Array, Vector
+from densarm.values.checks import finite_tuple, finite_vector, positive
+
+DEFAULT_ACCELERATION = 10.0
+"""Acceleration limit where nothing is known [rad/s² or m/s²]; a URDF carries none."""
+
+_UNLIMITED = 1e12  # URDFs write huge numbers where a joint has no limit
+_LINK_MARK = " (link)"
+
+
+@dataclass(frozen=True)
+class JointLimits:
+    """Limits of the joints, each of shape (nv,); infinite where a joint has none."""
+
+    lower: Array
+    """Lower position limit [rad or m]; minus infinity on continuous joints and beyond 1e12."""
+    upper: Array
+    """Upper position limit [rad or m]; infinity on continuous joints and beyond 1e12."""
+    velocity: Array
+    """Velocity limit [rad/s or m/s]; infinite where the URDF writes zero, or 1e12 or more."""
+    acceleration: Array
+    """Acceleration limit [rad/s² or m/s²]."""
+    effort: Array
+    """Torque or force limit [N·m or N]; infinite as the velocity limit."""
+
+
+def joint_limits(model: pin.Model, acceleration: Vector | None) -> JointLimits:
+    """Return the limits of an arm's joints; None for the default acceleration on every joint."""
+    if acceleration is None:
+        acceleration = (DEFAULT_ACCELERATION,) * model.nv
+    given = finite_vector("acceleration", acceleration, model.nv)
+    positive("acceleration", given.min())
+    joints = list(model.joints)[1:]
+    index = [joint.idx_q for joint in joints]
+    lower, upper = model.lowerPositionLimit[index], model.upperPositionLimit[index]
+    continuous = np.array([joint.nq == 2 for joint in joints])
+    return JointLimits(
+        lower=np.where(continuous | (lower <= -_UNLIMITED), -np.inf, lower),
+        upper=np.where(continuous | (upper >= _UNLIMITED), np.inf, upper),
+        velocity=_limit_or_infinity(model.upperVelocityLimit),
+        acceleration=given,
+        effort=_limit_or_infinity(model.upperEffortLimit),
+    )
+
+
+def without_joints(description: RobotDescription, locked: Mapping[str, float]) -> RobotDescription:
+    """Return the description with joints locked [rad or m], also in what it gives per joint."""
+    if not locked:
+        return description
+    positions = {j: finite_tuple(f"locked_joints.{j}", [x], 1)[0] for j, x in locked.items()}
+    changed = replace(description, locked_joints={**description.locked_joints, **positions})
+    return _of_joints(changed, _joint_names(description), _joint_names(changed))
+
+
+def only_joints(
+    description: RobotDescription, joints: Iterable[str], locked: Mapping[str, float]
+) -> RobotDescription:
+    """Return the description with all joints locked but those named.
+
+    They stand at the positions given [rad or m], the others at zero or the limit next to it.
+    """
+    urdf = Urdf(description)
+    names = [name for name in list(urdf.model.names)[1:] if name not in description.locked_joints]
+    for name in joints:
+        if name not in names:
+            raise UnknownNameError("joint", name, names)
+        if name in locked:
+            raise InvalidValueError(f"locked_joints.{name}", locked[name], "of no joint in joints")
+    standing = set(names) - set(joints) - _mimics(urdf).keys()
+    others = {name: _neutral(urdf, name) for name in names if name in standing}
+    return without_joints(description, {**others, **locked})
+
+
+def without_subtrees(description: RobotDescription, joints: Iterable[str]) -> RobotDescription:
+    """Return a robot without joints of any type, and without all that they carry, a gripper say.
+
+    What the description says of the links and joints that go, goes too; an end effector among them
+    becomes the last link.
+    """
+    root = parse_robot_xml(description.urdf, "URDF")
+    whole, before = _names(root, "link"), _joint_names(description)
+    _cut(root, joints)
+    kept_links, kept_joints = _names(root, "link"), _names(root, "joint")
+    srdf, end = description.srdf, description.end_effector
+    return _of_joints(
+        description,
+        before,
+        kept_joints,
+        urdf=ElementTree.tostring(root, encoding="unicode"),
+        srdf=None if srdf is None else _without_pairs(srdf, whole - kept_links),
+        locked_joints={j: x for j, x in description.locked_joints.items() if j in kept_joints},
+        end_effector=end if end in kept_links | kept_joints else None,
+    )
+
+
+def lock_joints(
+    urdf: Urdf, geometry: pin.GeometryModel, given: Mapping[str, float]
+) -> tuple[pin.Model, pin.GeometryModel]:
+    """Return a URDF's models without joints locked at positions [rad or m], and their followers."""
+    positions = _locked_positions(urdf, given)
+    for name, (leader, _, _) in _mimics(urdf).items():
+        if name not in positions:
+            moves = urdf.model.existJointName(leader)
+            raise RobotDescriptionError(
+                f"joint {name!r} mimics {leader!r}, which "
+                f"{'moves' if moves else 'is no joint'}: lock {'either' if moves else 'it'} by "
+                f"locked_joints={{{leader if moves else name!r}: position}}"
+            )
+    if not positions:
+        return urdf.model, geometry
+    q = pin.neutral(urdf.model)
+    for name, position in positions.items():
+        joint = _joint(urdf, name)
+        if joint.nv == 1:
+            single = [np.cos(position), np.sin(position)] if joint.nq == 2 else [position]
+            q[joint.idx_q : joint.idx_q + joint.nq] = single
+        elif position != 0.0:
+            raise RobotDescriptionError(
+                f"joint {name!r} has {joint.nv} degrees of freedom, so it can be locked at 0 "
+                "alone, its neutral pose"
+            )
+    return _reduced(urdf.model, geometry, [_joint(urdf, name).id for name in positions], q)
+
+
+def _mimics(urdf: Urdf) -> dict[str, tuple[str, float, float]]:
+    """Return the joints that follow others: name to leader, multiplier and offset."""
+    mimics = {}
+    for joint in urdf.root.iter("joint"):
+        element, name = joint.find("mimic"), joint.get("name", "")
+        if element is not None and urdf.model.existJointName(name):
+            multiplier, offset = element.get("multiplier", "1"), element.get("offset", "0")
+            mimics[name] = (element.get("joint", ""), float(multiplier), float(offset))
+    return mimics
+
+
+def _joint_names(description: RobotDescription) -> list[str]:
+    """Return the names of the joints that the arm keeps, in Pinocchio's order."""
+    urdf = Urdf(description)
+    locked = _locked_positions(urdf, description.locked_joints)
+    return [name for name in list(urdf.model.names)[1:] if name not in locked]
+
+
+def _locked_positions(urdf: Urdf, given: Mapping[str, float]) -> dict[str, float]:
+    """Return the positions of all locked joints: those given, and those that mimic them."""
+    names = list(urdf.model.names)[1:]
+    for name in given:
+        if name not in names:
+            raise UnknownNameError("joint to lock", name, names)
+    all_joints = {joint.get("name", "") for joint in urdf.root.iter("joint")}
+    standing = {**dict.fromkeys(all_joints - set(names), 0.0), **given}
+    followers = {name: mimic for name, mimic in _mimics(urdf).items() if name not in given}
+    while ready := [name for name, mimic in followers.items() if mimic[0] in standing]:
+        for name in ready:
+            leader, multiplier, offset = followers.pop(name)
+            standing[name] = multiplier * standing[leader] + offset
+    locked = {name: standing[name] for name in names if name in standing}
+    for name, position in locked.items():
+        finite_vector(f"locked_joints.{name}", [position], 1)
+    return locked
+
+
+def _reduced(
+    model: pin.Model, geometry: pin.GeometryModel, ids: list[int], q: Array
+) -> tuple[pin.Model, pin.GeometryModel]:
+    """Lock joints at q; Pinocchio does not tell a joint to lock from a link of the same name."""
+    for frame in model.frames:
+        if frame.type == pin.FrameType.BODY:
+            frame.name += _LINK_MARK
+    model, (geometry,) = pin.buildReducedModel(model, [geometry], ids, q)
+    for frame in model.frames:
+        frame.name = frame.name.removesuffix(_LINK_MARK)
+    return model, geometry
+
+
+def _joint(urdf: Urdf, name: str) -> pin.JointModel:
+    return urdf.model.joints[urdf.model.getJointId(name)]
+
+
+def _neutral(urdf: Urdf, name: str) -> float:
+    joint = _joint(urdf, name)
+    if joint.nq > 1:
+        return 0.0
+    limits = urdf.model.lowerPositionLimit[joint.idx_q], urdf.model.upperPositionLimit[joint.idx_q]
+    return float(np.clip(0.0, *limits))
+
+
+def _of_joints(
+    description: RobotDescription, before: list[str], kept: Collection[str], **changes: Any
+) -> RobotDescription:
+    """Return a description with changes, and what it gives per joint for the joints kept alone."""
+    index, given = [i for i, name in enumerate(before) if name in kept], description.acceleration
+    postures = description.postures.items()
+    return replace(
+        description,
+        acceleration=None if given is None else [given[i] for i in index],
+        postures={name: [angles[i] for i in index] for name, angles in postures},
+        **changes,
+    )
+
+
+def _cut(root: ElementTree.Element, joints: Iterable[str]) -> None:
+    """Take joints and what they carry out of a URDF."""
+    known = {joint.get("name", ""): joint for joint in root.findall("joint")}
+    links = {link.get("name", ""): link for link in root.findall("link")}
+    waiting = list(joints)
+    while waiting:
+        name = waiting.pop()
+        if name not in known:
+            raise UnknownNameError("joint to cut at", name, known)
+        child = _end(known[name], "child")
+        waiting += [j for j, joint in known.items() if _end(joint, "parent") == child]
+        for element in (known[name], links.get(child)):
+            if element is not None and element in root:
+                root.remove(element)
+
+
+def _end(joint: ElementTree.Element, kind: str) -> str:
+    end = joint.find(kind)
+    return "" if end is None else end.get("link", "")
+
+
+def _names(root: ElementTree.Element, kind: str) -> set[str]:
+    return {element.get("name", "") for element in root.findall(kind)}
+
+
+def _without_pairs(srdf: str, links: set[str]) -> str:
+    root = parse_robot_xml(srdf, "SRDF")
+    for pair in root.findall("disable_collisions"):
+        if {pair.get("link1"), pair.get("link2")} & links:
+            root.remove(pair)
+    return ElementTree.tostring(root, encoding="unicode")
+
+
+def _limit_or_infinity(limit: Array) -> Array:
+    return np.where((limit <= 0.0) | (limit >= _UNLIMITED), np.inf, limit)

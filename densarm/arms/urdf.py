@@ -1,0 +1,145 @@
+"""A URDF's text to Pinocchio's models, with the reason in one line where that fails."""
+
+import os
+import xml.etree.ElementTree as ElementTree
+from collections.abc import Callable, Sequence
+from copy import deepcopy
+from pathlib import Path
+from typing import TypeVar
+
+import coal
+import pinocchio as pin
+
+from densarm.arms.description import (
+    DATA_WHEEL,
+    RobotDescription,
+    data_wheel_folder,
+    parse_robot_xml,
+)
+from densarm.errors import RobotDescriptionError
+from densarm.scene.mesh import COAL_MESSAGES
+from densarm.values.files import captured_stderr
+
+T = TypeVar("T")
+
+# Reads a file again once it has changed. OBB is the cheapest tree whose vertices Python can read.
+_MESHES = coal.CachedMeshLoader(coal.BV_OBB)
+
+_ELEMENTS = ("collision", "visual")
+
+_URDFDOM_MESSAGES = rb"(?:Error|Warning): (?:.*\n)+? +at line \d+ in .*\n"
+
+
+class Urdf:
+    """A URDF that Pinocchio can parse: capsules as cylinders, meshes by absolute paths."""
+
+    def __init__(self, description: RobotDescription) -> None:
+        self.root = parse_robot_xml(description.urdf, "URDF")
+        drawn = [link for link in self.root.findall("link") if link.find("visual") is not None]
+        self.links_without_collision = tuple(
+            link.get("name", "") for link in drawn if link.find("collision") is None
+        )
+        """Links that it draws and gives no collision geometry."""
+        for link in drawn:
+            _collide_as_drawn(link, description.collision_from_visual)
+        self._folders = [
+            str(data_wheel_folder()) if folder == DATA_WHEEL else folder
+            for folder in description.package_dirs
+        ]
+        self._capsules = {name: _rename_capsules(self.root, name) for name in _ELEMENTS}
+        self.model: pin.Model = _from_urdf(lambda: pin.buildModelFromXML(self._text()))
+        """The model, of all joints that the URDF has."""
+        for link in self.root.findall("link"):
+            if not self.model.existBodyName(link.get("name", "")):  # the parser leaves it out
+                raise RobotDescriptionError(
+                    f"URDF: link {link.get('name')!r} cannot be reached from the root link: "
+                    "joints form a circle"
+                )
+
+    def geometry(self, kind: pin.GeometryType) -> pin.GeometryModel:
+        """Return the collision or visual geometry."""
+        element = kind.name.lower()
+        _resolve_meshes(self.root, element, self._folders)
+        text = self._text()
+        geometry = _from_urdf(
+            lambda: pin.buildGeomFromUrdfString(self.model, text, kind, mesh_loader=_MESHES)
+        )
+        for item in geometry.geometryObjects:
+            if item.name in self._capsules[element] and isinstance(item.geometry, coal.Cylinder):
+                item.geometry = coal.Capsule(item.geometry.radius, 2.0 * item.geometry.halfLength)
+        return geometry
+
+    def _text(self) -> str:
+        return ElementTree.tostring(self.root, encoding="unicode")
+
+
+def _collide_as_drawn(link: ElementTree.Element, which: str) -> None:
+    """Give a link that is drawn its visual geometry as collision geometry, if it is to have it."""
+    own = link.findall("collision")
+    if which == "never" or (own and which == "missing"):
+        return
+    for element in own:
+        link.remove(element)
+    for visual in link.findall("visual"):
+        collision = deepcopy(visual)
+        collision.tag = "collision"
+        link.append(collision)
+
+
+def _rename_capsules(root: ElementTree.Element, element: str) -> set[str]:
+    """Call capsules cylinders, which the parser knows, and return their names in Pinocchio."""
+    names = set()
+    for link in root.findall("link"):
+        for index, item in enumerate(link.findall(element)):
+            capsule = item.find("geometry/capsule")
+            if capsule is not None:
+                capsule.tag = "cylinder"
+                names.add(f"{link.get('name')}_{index}")
+    return names
+
+
+def _resolve_meshes(root: ElementTree.Element, element: str, folders: Sequence[str]) -> None:
+    for link in root.iter("link"):
+        for mesh in link.iterfind(f"{element}//mesh"):
+            name = mesh.get("filename", "")
+            file = _mesh_file(name, folders)
+            if file is None:
+                raise RobotDescriptionError(
+                    f"URDF: mesh {name!r} of link {link.get('name')!r} could not be found in "
+                    f"{', '.join(folders)}; name the folders that hold its package as package_dirs"
+                )
+            mesh.set("filename", str(file))
+
+
+def _mesh_file(name: str, folders: Sequence[str]) -> Path | None:
+    """Return the file that a path, ``file://``, ``package://`` or ``model://`` names.
+
+    A package may lie in a folder of another name, as after unpacking an archive.
+    """
+    scheme, _, path = name.rpartition("://")
+    inside = path.partition("/")[2] if scheme in {"package", "model"} else path
+    for candidate in (Path(folder) / part for part in (path, inside) for folder in folders):
+        # Not Path.is_file, which raises where a name is too long.
+        if os.path.isfile(candidate):  # noqa: PTH113
+            return candidate.resolve()
+    return None
+
+
+def _from_urdf(parse: Callable[[], T]) -> T:
+    """Return what a parser of Pinocchio makes of a URDF, or raise the reason that it prints.
+
+    It also prints, and goes on without them, about shapes and inertias that it cannot read.
+    """
+    raised = ""
+    with captured_stderr(_URDFDOM_MESSAGES + b"|" + COAL_MESSAGES) as printed:
+        try:
+            result = parse()
+        except (ValueError, RuntimeError) as error:
+            raised = str(error) or type(error).__name__
+    # urdfdom ends by the line of its code, coal marks the line that matters by "message:".
+    errors = [text.rstrip().rpartition("\n")[0] for text in printed if text.startswith("Error:")]
+    reasons = [text.removeprefix("Error:").strip().replace("\n", " ") for text in errors]
+    if reasons or raised:
+        reason = [*reasons, *raised.split("message: ")[-1].splitlines()][0]
+        raise RobotDescriptionError(f"URDF: {reason.rstrip('.')}")
+    return result

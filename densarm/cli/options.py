@@ -1,0 +1,82 @@
+"""Options that commands share: numbers, and the files to write."""
+
+import os
+from collections.abc import Callable
+from functools import reduce
+from pathlib import Path
+from typing import Any
+
+import click
+
+Decorator = Callable[[Callable[..., Any]], Callable[..., Any]]
+
+
+def together(*options: Decorator) -> Decorator:
+    """Return a decorator that adds several options to a command, in this order."""
+    return lambda command: reduce(lambda done, option: option(done), reversed(options), command)
+
+
+def number_option(name: str, default: int | None, help_text: str, least: int = 1) -> Decorator:
+    """Return a decorator that adds an option of a whole number, `least` or above."""
+    kind = click.IntRange(min=least)
+    return click.option(name, type=kind, default=default, show_default=True, help=help_text)
+
+
+def choice_option(name: str, choices: list[str], help_text: str) -> Decorator:
+    """Return a decorator that adds an option of a word, by default the first of the choices."""
+    kind = click.Choice(choices)
+    return click.option(name, type=kind, default=choices[0], show_default=True, help=help_text)
+
+
+def output_option(
+    name: str, metavar: str, help_text: str, endings: tuple[str, ...] = ()
+) -> Decorator:
+    """Return a decorator that adds an option which names a file to write.
+
+    Its value is a path, or None; it is checked before the command starts its work.
+
+    Args:
+        name: of the option, such as ``--save``.
+        metavar: how the help calls its value.
+        help_text: what is written.
+        endings: those that the file may have, such as ``.png``; any where none are given.
+    """
+
+    def check(ctx: click.Context, param: click.Parameter, path: Path | None) -> Path | None:
+        fault = None if path is None else _fault(path, endings)
+        if fault:
+            raise click.BadParameter(f"{path}: {fault}", ctx, param)
+        return path
+
+    kind = click.Path(path_type=Path)
+    return click.option(name, type=kind, callback=check, metavar=metavar, help=help_text)
+
+
+PLOT_ENDINGS = (".png", ".pdf", ".svg")
+
+picture_options = together(
+    output_option("--html", "RUN.html", "Write a page that plays the run."),
+    output_option(
+        "--plot",
+        "RUN.png",
+        "Plot positions, velocities, torques, clearance and density over time.",
+        PLOT_ENDINGS,
+    ),
+    output_option(
+        "--png", "RUN.png", "Write a picture of the moment of smallest clearance.", (".png",)
+    ),
+    output_option("--gif", "RUN.gif", "Write an animated picture, in real time.", (".gif",)),
+)
+"""Adds --html, --plot, --png and --gif to a command, whose values `write_pictures` takes."""
+
+
+def _fault(path: Path, endings: tuple[str, ...]) -> str | None:
+    if path.is_dir():
+        return "is a folder, give a file"
+    if not path.parent.is_dir():
+        return f"the folder {path.parent} does not exist"
+    if not os.access(path.parent, os.W_OK):
+        return f"the folder {path.parent} cannot be written to"
+    if endings and path.suffix.lower() not in endings:
+        return f"must end in {' or '.join(endings)}"
+    return None

@@ -1,0 +1,148 @@
+"""What commands leave: progress, JSON, pictures, tables, and reports in words."""
+
+from __future__ import annotations
+
+import json
+import math
+import sys
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from densarm.values.files import atomic_file
+from densarm.values.outcome import Outcome
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from densarm.certificates.certificate import Certificate
+    from densarm.certificates.records import EnergyRecord, RantzerRecord
+    from densarm.simulation.run import Run
+
+_COLUMN = 18  # characters
+_WIDTH = 110  # characters of a table, at least, so that no number is cut
+
+
+@contextmanager
+def progress() -> Iterator[Callable[[str], None]]:
+    """Give a function that shows a phrase until the next one; it shows nothing off a terminal."""
+    if not sys.stdout.isatty():
+        yield lambda _: None
+        return
+    from rich.console import Console
+
+    with Console().status("starting") as status:
+        yield status.update
+
+
+def write_json(path: Path, data: Mapping[str, Any]) -> None:
+    """Write JSON data, without infinities and NaN, to a file, whole or not at all.
+
+    Raises:
+        FileContentError: the file cannot be written.
+    """
+    text = json.dumps(data, indent=2, allow_nan=False)
+    with atomic_file(path) as file:
+        file.write(f"{text}\n".encode())
+
+
+def write_pictures(run: Run, html: Any, plot: Any, png: Any, gif: Any) -> None:
+    """Write the files that `picture_options` asked for, by their paths or None.
+
+    Raises:
+        FileContentError: a file cannot be written.
+    """
+    import densarm  # which imports matplotlib and meshcat, that take a second, when they are used
+
+    if html:
+        densarm.save_html(run, html)
+    if plot:
+        densarm.save_plot(run, plot)
+    if png:
+        densarm.save_picture(run, png)
+    if gif:
+        densarm.save_animation(run, gif)
+
+
+def print_table(rows: Sequence[Mapping[str, str]], caption: str, title: str | None = None) -> None:
+    """Print a table of texts by their headings, without columns in which there is none."""
+    from rich.box import SIMPLE
+    from rich.console import Console
+    from rich.table import Table
+    from rich.text import Text
+
+    table = Table(
+        title=title,
+        caption=caption,
+        box=SIMPLE,
+        padding=0,
+        show_edge=False,
+        title_justify="left",
+        caption_justify="left",
+    )
+    first, *others = shown = [heading for heading in rows[0] if any(row[heading] for row in rows)]
+    table.add_column(first, no_wrap=True)
+    for heading in others:
+        table.add_column(Text(heading), justify="right")
+    for row in rows:
+        table.add_row(*(row[heading] for heading in shown))
+    Console(width=max(Console().width, _WIDTH), highlight=False).print(table)
+
+
+def print_run(run: Run, compiled: float) -> None:
+    """Print how a run ended, its figures and what is proved about it.
+
+    Args:
+        run: the run.
+        compiled: time that compiling kernels took meanwhile [s].
+    """
+    color = "green" if run.outcome == Outcome.REACHED else "red"
+    click.echo(f"{run.task.title}\n")
+    click.secho(f"{run.outcome}: {run.outcome.description}", fg=color, bold=True)
+    if run.detail:
+        click.echo(run.detail)
+    click.echo()
+    smallest = float(run.clearance.min())
+    figures = {
+        "duration": f"{run.time[-1]:.3f} s",
+        "min clearance": f"{smallest * 1e3:.4g} mm" if math.isfinite(smallest) else "no pairs",
+        "goal error": "no goal" if run.task.goal is None else f"{run.goal_error:.2g} rad",
+        "peak torque": f"{run.peak_torque_ratio:.0%} of the limits",
+        "planning": f"{run.plan_time:.3f} s, ready after {run.preparation_time:.2f} s",
+    }
+    if compiled > 0.0:
+        figures["compiled"] = f"{compiled:.1f} s, once on this machine"
+    if run.tracking_error is not None:
+        figures["tracking error"] = f"{run.tracking_error:.2g} rad"
+    if run.replanned_at:
+        figures["planned again"] = ", ".join(f"at t = {time:.3f} s" for time in run.replanned_at)
+    for label, value in figures.items():
+        click.echo(f"{label:<{_COLUMN}}{value}")
+    click.echo()
+    print_certificate(run.certificate)
+
+
+def print_certificate(certificate: Certificate) -> None:
+    """Print each check of a certificate and whether it holds."""
+    click.echo(f"{'certified':<{_COLUMN}}{_verdict(certificate.certified)}")
+    for check in certificate.checks:
+        click.echo(f"  {check.name:<{_COLUMN - 2}}{_verdict(check.holds)}  {check.detail}")
+
+
+def print_records(energy: EnergyRecord, rantzer: RantzerRecord) -> None:
+    """Print what is recorded of a run without being a part of its certificate."""
+    found = "not applicable: no sample away from goal and contact"
+    if rantzer.share is not None:
+        found = (
+            f"holds at {rantzer.share:.0%} of {rantzer.samples} samples (gauge {rantzer.gauge}, "
+            f"plain density), smallest value {rantzer.smallest:.3g} at t = {rantzer.time:.3f} s"
+        )
+    click.echo("recorded, not certified")
+    click.echo(f"  {'energy':<{_COLUMN - 2}}{energy.verdict}: {energy.detail}")
+    click.echo(f"  {'Rantzer':<{_COLUMN - 2}}{found}")
+
+
+def _verdict(holds: bool) -> str:
+    return click.style("yes", fg="green") if holds else click.style("no ", fg="red")

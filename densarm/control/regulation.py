@@ -1,0 +1,218 @@
+"""Regulation: controllers that follow a planning system q̇ = k(q) to the goal, without a clock."""
+
+from collections.abc import Sequence
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from densarm.arms.arm import Arm
+from densarm.control.controller import Gains, checked_state
+from densarm.control.inverse_dynamics import InverseDynamics
+from densarm.control.speed_law import SpeedLaw, SpeedParameters
+from densarm.control.stopping import BackupFilter
+from densarm.control.tracking import require_smooth_goal
+from densarm.density.goal_distance import GoalDistance, InertiaDistance, TorusDistance
+from densarm.density.navigation_density import DensityParameters
+from densarm.density.sub_goals import GuidedDensity, GuidePath, SubGoals
+from densarm.density.unsafe_sets import SensingParameters, UnsafeSet
+from densarm.errors import InvalidValueError
+from densarm.planning.plan import inside_limits
+from densarm.values.arrays import Array
+from densarm.world.active_pairs import DistanceBounds
+from densarm.world.configurations import infeasibility
+from densarm.world.stopping import HELD_SHARE
+from densarm.world.swept_check import SweptCheck
+from densarm.world.world import World
+
+_NEAR = 1e-3  # [rad], below which a sub-goal's pull fades
+
+
+class VelocityField(Protocol):
+    """A planning system q̇ = k(q) on the joint space of an arm, before its speed is limited."""
+
+    @property
+    def distances(self) -> DistanceBounds:
+        """Distances of all pairs, at the configuration that was evaluated last."""
+        ...
+
+    def velocity(self, q: Array, metric: Array | None) -> tuple[Array, float]:
+        """Return k (nv,) [rad/s or m/s] at q (nq,), and the length of the way left [rad].
+
+        k is zero where it leads nowhere. Gradients are taken in the inverse of a positive definite
+        metric (nv, nv); None for the identity.
+        """
+        ...
+
+
+class FieldRegulation:
+    r"""Regulate to the goal along a velocity field, without a reference in time.
+
+    .. math:: \tau = H + M K_v (k(q) - \dot q)
+
+    With the field of the density, k = (K_p/K_v) ∇ρ at the speed of the speed law, this is [ZNV]
+    eq. 17 with a constant q_d, its attraction scaled before its damping. Where the arm could no
+    longer stop in the free space ahead, it stops along a straight line. With `inertia_at`, a
+    configuration (nq,) whose largest inertia is the unit of the metric M, gradients are taken in
+    that, so that the torque itself points along them.
+
+    Source: [ZNV] eq. 17.
+    """
+
+    def __init__(
+        self,
+        arm: Arm,
+        field: VelocityField,
+        speed_law: SpeedLaw,
+        gains: Gains = Gains(),
+        period: float = 0.001,
+        inertia_at: Array | None = None,
+    ) -> None:
+        self._arm = arm
+        self._field = field
+        self._speed_law = speed_law
+        self._gain = gains.velocity
+        self._dynamics = InverseDynamics(arm, HELD_SHARE * arm.limits.acceleration)
+        self._filter = BackupFilter(arm, speed_law, gains, period)
+        self._scale = 0.0
+        if inertia_at is not None:
+            self._scale = 1.0 / float(arm.mass_matrix(inertia_at).diagonal().max())
+        self._dynamics.load()
+        checked_state(arm, arm.configuration(np.zeros(arm.nv)), np.zeros(arm.nv))  # loads a kernel
+
+    def torque(self, t: float, q: ArrayLike, v: ArrayLike) -> Array:
+        """Act as `Controller.torque`."""
+        q, v = checked_state(self._arm, q, v)
+        self._dynamics.update(q, v)
+        metric = self._scale * self._dynamics.mass_matrix() if self._scale > 0.0 else None
+        wanted = self._dynamics.torque(-self._gain * v, self._gain * self._limited(q, metric))
+        return self._filter.torque(t, self._dynamics, q, v, wanted, self._field.distances)
+
+    def velocity(self, t: float, q: ArrayLike, v: ArrayLike) -> Array:
+        """Return the planning system k(q) itself, as `VelocityController.velocity`."""
+        return self._limited(checked_state(self._arm, q, v)[0], None)
+
+    def _limited(self, q: Array, metric: Array | None) -> Array:
+        velocity, way_left = self._field.velocity(q, metric)
+        return self._speed_law.limit(q, velocity, self._field.distances, way_left)
+
+
+class DensityRegulation(FieldRegulation):
+    r"""Regulate to a goal by the density, obstacles acting wherever the arm is.
+
+    .. math:: \tau = H + M K_v (k(q) - \dot q), \qquad k(q) = \min\{1, s / \|p\|\} \, p, \qquad
+        p = \frac{K_p}{K_v} \frac{\ell}{\|q \ominus q_{sub}\|} \, \nabla\rho(q)
+
+    s is the speed law. A sub-goal q_sub pulls as from the end of the way ℓ that is left to the
+    goal: else the speed would jump whenever the next sub-goal comes in sight. Towards the goal
+    itself the factor is one.
+
+    In its plain form the torque points along ∇ρ itself, u = ∇ρ + d(q, q̇): the arm follows M⁻¹∇ρ,
+    the gradient in the metric of its inertia, and d cancels the nonlinearities and damps. With V in
+    that metric too both lead straight from sub-goal to sub-goal, and differ where obstacles are
+    sensed.
+
+    Args:
+        world: the arm among obstacles.
+        goal: configuration (nq,).
+        path: sub-goals that lead there, as `plan_path` finds them; None for the goal alone.
+        plain: whether in the plain form.
+        margin: safety margin m of the pairs [m].
+        gains: K_p and K_v.
+        period: time between two calls [s].
+        goal_distance: V; None for a `TorusDistance`, or an `InertiaDistance` in the plain form.
+        unsafe_sets: what else must not be entered, beside pairs of bodies and joint limits.
+        density: α, θ, gauge and blend.
+        sensing: sensing distances.
+        speed: parameters of the speed law.
+
+    Attributes:
+        goal: as given (nq,).
+
+    Raises:
+        InvalidValueError: a goal that touches something or is outside limits, or a density that is
+            singular or flat at the goal.
+
+    Source: [ZNV] eq. 11, 17 and section V-C, the speed law in place of the saturation of eq. 14.
+    """
+
+    def __init__(
+        self,
+        world: World,
+        goal: ArrayLike,
+        *,
+        path: GuidePath | None = None,
+        plain: bool = False,
+        margin: float = 0.0,
+        gains: Gains = Gains(),
+        period: float = 0.001,
+        goal_distance: GoalDistance | None = None,
+        unsafe_sets: Sequence[UnsafeSet] = (),
+        density: DensityParameters = DensityParameters(),
+        sensing: SensingParameters = SensingParameters(),
+        speed: SpeedParameters = SpeedParameters(),
+    ) -> None:
+        require_smooth_goal(density, may_blend=True)
+        arm = world.arm
+        self._check = SweptCheck(world, margin)
+        self._sensing = sensing
+        self.goal: Array = self._checked(goal)
+        path = path or self._to_goal_alone()
+        if goal_distance is None:
+            goal_distance = InertiaDistance(arm, self.goal) if plain else TorusDistance(arm)
+        goals = SubGoals(self._check, path, sensing)
+        self._guided = GuidedDensity(self._check, goals, goal_distance, density, tuple(unsafe_sets))
+        field = _DensityField(self._guided, gains.rate)
+        inertia_at = path.waypoints[-1] if plain else None
+        super().__init__(arm, field, SpeedLaw(world, margin, speed), gains, period, inertia_at)
+
+    def set_goal(self, goal: ArrayLike) -> None:
+        """Lead to another goal from the next call on, without sub-goals.
+
+        Args:
+            goal: configuration (nq,).
+
+        Raises:
+            InvalidValueError: as for the class; the old goal is kept then.
+        """
+        self.goal = self._checked(goal)
+        self._guided.lead_along(SubGoals(self._check, self._to_goal_alone(), self._sensing))
+
+    def describe_stall(self, q: Array) -> str:
+        """Return, as a phrase, why the density leads nowhere from q (nq,), and what blocks it."""
+        return self._guided.describe_stall(q)
+
+    def _to_goal_alone(self) -> GuidePath:
+        return GuidePath(np.tile(inside_limits(self._check, self.goal), (2, 1)), is_clear=False)
+
+    def _checked(self, goal: ArrayLike) -> Array:
+        q = self._check.arm.check_configuration("goal", goal)
+        if fault := infeasibility(self._check, {"goal": q}):
+            raise InvalidValueError("goal", q, f"one that can be held, and clear ({fault})")
+        return q
+
+
+class _DensityField:
+    """The gradient of the guided density, pulling from the end of the way: a `VelocityField`."""
+
+    def __init__(self, guided: GuidedDensity, rate: float) -> None:
+        self._guided, self._rate = guided, rate
+        self._gradient = np.zeros(guided.world.arm.nv)
+
+    @property
+    def distances(self) -> DistanceBounds:
+        return self._guided.distances
+
+    def velocity(self, q: Array, metric: Array | None) -> tuple[Array, float]:
+        """Act as `VelocityField.velocity`, and move on along the sub-goals."""
+        guided = self._guided
+        guided.update(q)
+        to_sub_goal, beyond = guided.way_left(q)
+        if guided.is_critical():
+            return np.zeros_like(self._gradient), to_sub_goal + beyond
+        guided.write_gradient(q, self._gradient)
+        pull = 1.0 + beyond / max(to_sub_goal, _NEAR)
+        velocity = self._rate * pull * self._gradient
+        if metric is not None:
+            velocity = np.asarray(np.linalg.solve(metric, velocity), dtype=np.float64)
+        return velocity, to_sub_goal + beyond

@@ -1,0 +1,133 @@
+"""Stopping an arm, holding it still, and a filter that keeps it able to stop."""
+
+import math
+
+import numpy as np
+import pinocchio as pin
+
+from densarm.arms.arm import Arm
+from densarm.control.controller import Gains
+from densarm.control.inverse_dynamics import InverseDynamics
+from densarm.control.speed_law import SpeedLaw
+from densarm.values.arrays import Array
+from densarm.world.active_pairs import DistanceBounds
+from densarm.world.stopping import StoppingTrajectory
+
+_REST = 1e-3  # [rad/s or m/s], below which the arm is held where it is
+_ACCELERATION_SHARE = 0.97  # asked for: a torque is held while the state changes
+
+
+class StopAndHold:
+    r"""Brings an arm to rest along a straight line of joint space and keeps it there.
+
+    .. math::
+
+        \tau = H - M \dot q / (T - t), \qquad
+        \tau = H - M \big( K_p (q \ominus q_{rest}) + K_v \dot q \big),
+
+    t the time since it began and T as in `StoppingTrajectory`; torques and accelerations are
+    within the limits. Where gravity asks for more torque than there is, the arm cannot be held.
+    The period is the time between two calls [s].
+    """
+
+    def __init__(self, arm: Arm, gains: Gains, period: float) -> None:
+        self._arm = arm
+        self._gains = gains
+        self._period = self._shortest = period
+        self._dynamics = InverseDynamics(arm, _ACCELERATION_SHARE * arm.limits.acceleration)
+        self._dynamics.load()
+        self._stopping = StoppingTrajectory(arm, _ACCELERATION_SHARE)
+        self._time_left = math.nan
+        self._rest: Array | None = None
+
+    @property
+    def is_holding(self) -> bool:
+        """Whether the arm has come to rest since the last `begin`."""
+        return self._rest is not None
+
+    def begin(self, q: Array, v: Array, is_gentle: bool = False) -> None:
+        """Begin to stop from q (nq,) and v (nv,); gently: as -K_v q̇ in the end.
+
+        That is stable with a delayed state too.
+        """
+        self._time_left = self._stopping.duration(q, v)
+        self._shortest = 1.0 / self._gains.velocity if is_gentle else self._period
+        self._rest = None
+
+    def torque(self, q: Array, v: Array, dt: float) -> Array:
+        """Return the torque (nv,) [N·m or N] at q (nq,) and v (nv,), dt [s] after the last call."""
+        self._dynamics.update(q, v)
+        self._time_left -= dt
+        if self._rest is None and np.abs(v).max() <= _REST:
+            self._rest = q.copy()
+        if self._rest is not None:
+            error = self._arm.difference(self._rest, q)
+            return self._dynamics.torque(-self._gains.velocity * v, -self._gains.position * error)
+        return self._dynamics.brake_torque(v, self._time_left, self._shortest)
+
+
+class BackupFilter:
+    r"""Replaces a torque by that which stops the arm where it could not be proved to stop after it.
+
+    From a state with a clear stopping trajectory the next one has one too: if not after the torque
+    that is asked for, then after the first part of the trajectory itself. Before, the filter limits
+    the jerk: of a wanted acceleration a* there is
+
+    .. math::
+
+        a_k = a_{k-1} + s\,(a^* - a_{k-1}), \qquad
+        s = \min\Big\{1, \min_i \frac{a_i^{max} \Delta t / T}{|a^*_i - a_{k-1,i}|}\Big\}
+
+    a_k is between a_{k-1} and a*: within any convex limits that both keep. The feedback a* =
+    K_v (k - q̇) settles from its largest acceleration by K_v a^max per second: T = 1 / K_v lets that
+    pass, and spreads the jumps of k. After a pause of more than a period and a half the arm counts
+    as unaccelerated. The jerk of stopping is not limited.
+
+    The period is the time that a torque is held [s].
+    """
+
+    def __init__(self, arm: Arm, speed_law: SpeedLaw, gains: Gains, period: float) -> None:
+        self._arm = arm
+        self._data = arm.model.createData()
+        self._speed_law = speed_law
+        self._period = period
+        self._stopping = StoppingTrajectory(arm)
+        smoothing_time = 1.0 / gains.velocity
+        self._step = arm.limits.acceleration * (period / smoothing_time)
+        self._last, self._time = np.zeros(arm.nv), math.nan
+
+    def torque(
+        self,
+        t: float,
+        dynamics: InverseDynamics,
+        q: Array,
+        v: Array,
+        wanted: Array,
+        distances: DistanceBounds,
+    ) -> Array:
+        """Return the wanted torque (nv,) [N·m or N] as far as the jerk allows, or that to stop.
+
+        The dynamics are updated at q (nq,) and v (nv,), where the distances of all pairs are these.
+        """
+        if not abs(t - self._time) <= 1.5 * self._period:
+            self._last = np.zeros_like(wanted)
+        self._time = t
+        a, tau = self._acceleration(q, v, wanted), wanted
+        change = a - self._last
+        excess = float((np.abs(change) / self._step).max())
+        if not excess <= 1.0:
+            limit = self._arm.limits.effort
+            tau = pin.rnea(self._arm.model, self._data, q, v, self._last + change / excess)
+            tau = np.asarray(np.clip(tau, -limit, limit))
+            a = self._acceleration(q, v, tau)
+        v_next = v + self._period * a
+        motion = self._period * np.maximum(np.abs(v), np.abs(v_next))
+        q_next = self._arm.integrate(q, self._period * v_next)
+        if not self._speed_law.can_stop(q_next, v_next, distances, motion):
+            tau = dynamics.brake_torque(v, self._stopping.duration(q, v), self._period)
+            a = self._acceleration(q, v, tau)
+        self._last = a
+        return tau
+
+    def _acceleration(self, q: Array, v: Array, tau: Array) -> Array:
+        return np.array(pin.aba(self._arm.model, self._data, q, v, tau))

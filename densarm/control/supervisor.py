@@ -1,0 +1,378 @@
+"""Supervisor: lets a controller act while all is well, and else stops the arm and holds it."""
+
+import math
+from dataclasses import dataclass
+from enum import StrEnum
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from densarm.arms.arm import Arm
+from densarm.control.controller import Controller, Gains, checked_state
+from densarm.control.state_observer import StateObserver, Tolerances
+from densarm.control.stopping import StopAndHold
+from densarm.planning.motion import Motion
+from densarm.values.arrays import Array
+from densarm.values.checks import positive
+from densarm.values.documented import documented
+from densarm.values.kernels import compiled
+
+HOLDING_GAINS = Gains(position=50.0, velocity=15.0)
+"""Stable with a delay of 50 ms in the state, by a phase margin of 33 degrees."""
+
+_FASTEST = 10.0  # of the velocity limits: beyond it a number is no velocity
+_UNLIMITED_FASTEST = 100.0  # [rad/s or m/s]
+_FARTHEST = 1e6  # [rad or m]
+_LONGEST_PREDICTION = 0.25  # [s]
+_ROUNDING = 1e-9  # relative, of torques at their limits
+_SLOW = 0.01  # [rad/s or m/s], which counts as rest
+
+
+class Fault(StrEnum):
+    """What a supervisor found, or was told."""
+
+    NONE = "none"
+    """Nothing is wrong; the controller acts."""
+    NOT_A_STATE = "not_a_state"
+    """The state had a wrong shape, was not finite, not on the unit circle or beyond reason."""
+    JUMPED = "jumped"
+    """The state is not where the dynamics could have brought it."""
+    FROZEN = "frozen"
+    """The configuration stayed the same while the arm must have moved."""
+    LATE = "late"
+    """Too much time passed between two calls."""
+    CLOCK = "clock"
+    """The time was not a finite number, or ran backwards."""
+    OFF_COURSE = "off_course"
+    """The arm is too far from where the controller wants it to be."""
+    NO_TORQUE = "no_torque"
+    """The controller failed, or gave a torque that is not finite or beyond the limits."""
+    SCENE_CHANGED = "scene_changed"
+    """The caller told that the scene is not that of the plan."""
+    STOPPED = "stopped"
+    """The caller asked for it."""
+
+
+@documented
+@dataclass(frozen=True)
+class Status:
+    """The first thing that went wrong since the controller last acted."""
+
+    fault: Fault = Fault.NONE
+    """What it was."""
+    sentence: str = "The controller acts."
+    """The same in words, with the time and the values."""
+
+
+class Supervisor:
+    """Passes on another controller's torque while all is well, and else stops the arm.
+
+    All is well while the state is one, the dynamics explain how it came from the last one under
+    the torque between (see `StateObserver`), calls come in time, the arm keeps to the controller's
+    reference if it has one (`tracking_error`), and the controller gives a finite torque within the
+    limits. Else the arm stops along a straight line and holds still, until `resume` is called: a
+    controller that follows a reference in time would otherwise chase what went on without it.
+    `torque` never raises, and whatever it is given its result is finite and within the torque
+    limits. Without a fault it is the controller's, bit for bit.
+
+    With `tolerances` None it is trusted that all is well, as in a simulation: the arm stops when
+    told to, and what the controller raises goes through.
+
+    What it rests on. A measured state that does not agree is left out, and the arm is braked where
+    the dynamics say that it is; one that then agrees with itself for the time `delay` is believed.
+    Without any believable state the arm is held by the torque that the model's gravity asks for at
+    the observed rest. That is no feedback: what the model does not know (payload, friction, a
+    push) moves the arm unseen, and an arm held upright falls in the end. Close mechanical brakes
+    then. Before the first state there is nothing to hold by, and the torque is zero. A state that
+    stays the same while the arm rests, that drifts slower than `Tolerances` allow, or another
+    scene cannot be noticed from here: who watches these calls `stop` or `scene_changed`. Between
+    two calls nothing can be done: a torque is held until the next one comes.
+
+    Args:
+        arm: the arm, as the plant is.
+        controller: acts while all is well.
+        period: time between two calls [s].
+        tolerances: what counts as normal; None to trust state, clock and controller.
+        gains: hold the arm at rest; higher ones sag less under a payload that the model does not
+            know, and bear less delay.
+
+    Attributes:
+        controller: what acts while all is well.
+        status: whether it acts, and if not, why.
+        trusts_state: whether the last state was believed.
+
+    Raises:
+        InvalidValueError: a period that is not positive.
+    """
+
+    def __init__(
+        self,
+        arm: Arm,
+        controller: Controller,
+        period: float = 0.001,
+        tolerances: Tolerances | None = Tolerances(),
+        gains: Gains = HOLDING_GAINS,
+    ) -> None:
+        self.controller = controller
+        self.status = Status()
+        self.trusts_state = False
+        self._arm = arm
+        self._began: float | None = 0.0  # the controller's own time
+        self._period = positive("period", period)
+        self._is_trusting = tolerances is None
+        self._tolerances = tolerances or Tolerances()
+        self._longest_gap = max(self._tolerances.gap, 1.5 * period)
+        velocity = arm.limits.velocity
+        self._fastest = np.where(np.isfinite(velocity), _FASTEST * velocity, _UNLIMITED_FASTEST)
+        self._gains = gains
+        self._agreed_for: float | None = None  # the candidate, if there is one
+        self._tau = np.zeros(arm.nv)
+        self._time: float | None = None  # of the last call
+        self._last_q = b""  # as measured
+        self._knows_state = self._brakes_anew = self._has_rested = self._needs_plan = False
+        self._state = arm.configuration(np.zeros(arm.nv)), np.zeros(arm.nv)
+        if not self._is_trusting:  # kernels are loaded, or compiled, here rather than in a loop
+            self._brake.begin(*self._state)
+            _takes(self._tau, arm.limits.effort, self._tau)
+            self._observer = StateObserver(arm, self._fastest, self._tolerances)
+            self._candidate = StateObserver(arm, self._fastest, self._tolerances)
+            self._measured(0.0, *self._state)
+
+    @cached_property
+    def _brake(self) -> StopAndHold:
+        return StopAndHold(self._arm, self._gains, self._period)
+
+    @property
+    def goal(self) -> Array | None:
+        """The controller's goal (nq,), if it has one."""
+        return getattr(self.controller, "goal", None)
+
+    @property
+    def motion(self) -> Motion | None:
+        """The controller's motion, if it has one."""
+        return getattr(self.controller, "motion", None)
+
+    @property
+    def tracking_error(self) -> float | None:
+        """How far off the controller's reference the arm is [rad or m]; None if it has none.
+
+        Zero while the arm is stopped.
+        """
+        error = getattr(self.controller, "tracking_error", None)
+        return error if error is None or self.status.fault == Fault.NONE else 0.0
+
+    def describe_stall(self, q: Array) -> str:
+        """Return why the arm rests at q (nq,): the status, or the controller's words if it acts."""
+        if self.status.fault != Fault.NONE:
+            return self.status.sentence
+        describe = getattr(self.controller, "describe_stall", None)
+        return str(describe(q)) if describe else ""
+
+    @property
+    def is_at_rest(self) -> bool:
+        """Whether the arm was stopped, and rests as far as is known."""
+        is_stopped = self.status.fault != Fault.NONE and self._brake.is_holding
+        return is_stopped and bool(np.abs(self._state[1]).max() <= _SLOW)
+
+    def stop(self, why: str = "The caller asked to stop.") -> None:
+        """Brake from the next call of `torque` on, and hold still.
+
+        Args:
+            why: for the status.
+        """
+        self._stop(Fault.STOPPED, why)
+
+    def scene_changed(self, how: str = "The scene has changed.") -> None:
+        """Brake from the next call of `torque` on, hold still, and resume with a new plan only.
+
+        The brake is a straight line, clear in the scene that the plan was made for.
+
+        Args:
+            how: for the status, e.g. which obstacle came or moved.
+        """
+        self._needs_plan = True
+        self._stop(Fault.SCENE_CHANGED, how)
+
+    def resume(self, controller: Controller | None = None) -> bool:
+        """Let a controller act again, if the arm rests and the last state was believed.
+
+        Args:
+            controller: acts from now on, e.g. along a new plan, its own time beginning with the
+                next call; None for the one before, which fits a law without a reference in time,
+                in the scene that it was made for. The next call may have any time.
+
+        Returns:
+            Whether it acts.
+        """
+        acts = self.status.fault == Fault.NONE
+        if not acts and not (self.is_at_rest and self.trusts_state):
+            return False
+        if self._needs_plan and controller is None:
+            return False
+        self._needs_plan = self._has_rested = False
+        if controller is not None:
+            self.controller, self._began = controller, None
+        self.status, self._time = Status(), None
+        return True
+
+    def torque(self, t: float, q: ArrayLike, v: ArrayLike) -> Array:
+        """Act as `Controller.torque`, but never raise unless it trusts: see `status`."""
+        if self._is_trusting and self.status.fault == Fault.NONE:
+            return self.controller.torque(self._own_time(t), q, v)
+        dt = self._elapsed(t)
+        measured = checked_state(self._arm, q, v) if self._is_trusting else self._measured(t, q, v)
+        if self._is_trusting and measured is not None:
+            self._state, self._knows_state, self.trusts_state = measured, True, True
+        else:
+            self._observe(t, measured, dt)
+        acts = self.status.fault == Fault.NONE and measured is not None
+        if not (acts and self._passes_on(t, *self._state)):
+            self._brake_or_hold(dt)
+        return self._tau.copy()
+
+    def _stop(self, fault: Fault, sentence: str) -> None:
+        if self.status.fault == Fault.NONE:
+            self.status = Status(fault, sentence)
+            self._brakes_anew = True
+
+    def _elapsed(self, t: float) -> float:
+        """Return the time since the last call [s], a period where it is not known."""
+        try:
+            now = float(t)
+        except (TypeError, ValueError, OverflowError):  # a caller may give anything
+            now = math.nan
+        last, self._time = self._time, now
+        if not math.isfinite(now):
+            self._time = None if last is None else last + self._period
+            self._stop(Fault.CLOCK, f"The time {t!r} is not a finite number.")
+            return self._period
+        if last is None:
+            return self._period
+        if now < last:
+            self._stop(Fault.CLOCK, f"The time ran back from {last:.6g} s to {now:.6g} s.")
+            return self._period
+        if now - last > self._longest_gap:
+            late = f"The call at t = {now:.6g} s came {now - last:.3g} s after the last one"
+            self._stop(Fault.LATE, f"{late}, more than {self._longest_gap:.3g} s.")
+        return now - last
+
+    def _measured(self, t: float, q: ArrayLike, v: ArrayLike) -> tuple[Array, Array] | None:
+        """Return q (nq,) and v (nv,), or None if they are no state."""
+        try:
+            q, v = checked_state(self._arm, q, v)
+        except Exception as error:  # noqa: BLE001  # a caller may give anything
+            self._stop(Fault.NOT_A_STATE, f"At t = {t} s, {_one_line(error)}.")
+            return None
+        if _is_plausible(q, v, _FARTHEST, self._fastest):
+            return q, v
+        largest = f"velocities up to {np.abs(v).max():.3g}, positions up to {np.abs(q).max():.3g}"
+        self._stop(Fault.NOT_A_STATE, f"At t = {t} s the state is beyond reason: {largest}.")
+        return None
+
+    def _observe(self, t: float, measured: tuple[Array, Array] | None, dt: float) -> None:
+        """Follow the dynamics, and believe the measured state if it agrees with them."""
+        self._observer.advance(min(dt, _LONGEST_PREDICTION), self._period, self._tau)
+        self.trusts_state, self._state = False, (self._observer.q, self._observer.v)
+        if measured is None:
+            self._agreed_for = None
+            return
+        last, self._last_q = self._last_q, measured[0].tobytes()
+        repeats = last == self._last_q
+        if not self._knows_state or dt > _LONGEST_PREDICTION:
+            self._believe(*measured)
+        elif self._observer.agrees(*measured, 0.0 if repeats else dt):
+            self.trusts_state, self._agreed_for = True, None
+        else:
+            self._doubt(t, *measured, dt, repeats)
+        if self.trusts_state:
+            self._state = measured
+
+    def _believe(self, q: Array, v: Array) -> None:
+        self._observer.start(q, v)
+        self._knows_state = self.trusts_state = self._brakes_anew = True
+        self._agreed_for = None
+
+    def _doubt(self, t: float, q: Array, v: Array, dt: float, repeats: bool) -> None:
+        """Brake; believe an unexplained state only once it has agreed with itself for long."""
+        position = np.abs(self._arm.difference(self._observer.q, q)).max()
+        velocity = np.abs(v - self._observer.v).max()
+        off = f"{position:.3g} in position and {velocity:.3g} in velocity (rad, m and s)"
+        if repeats:
+            why = f"the configuration has stood still, and is off by {off}"
+            self._stop(Fault.FROZEN, f"At t = {t} s {why}.")
+        else:
+            why = f"the state is off by {off} from where the dynamics put it"
+            self._stop(Fault.JUMPED, f"At t = {t} s {why}.")
+        if self._agreed_for is not None and not repeats:
+            self._candidate.advance(dt, self._period, self._tau)
+            if self._candidate.agrees(q, v, dt):
+                self._agreed_for += dt
+                if self._agreed_for >= self._tolerances.delay:
+                    self._believe(q, v)
+                return
+        self._candidate.start(q, v)
+        self._agreed_for = 0.0
+
+    def _passes_on(self, t: float, q: Array, v: Array) -> bool:
+        """Take the controller's torque over if it may be applied."""
+        limit = self._arm.limits.effort
+        try:
+            own = self.controller.torque(self._own_time(t), q, v)
+            tau = np.asarray(own, dtype=np.float64)
+            off = float(self.tracking_error or 0.0)
+        except Exception as error:  # noqa: BLE001  # whatever fails, the arm must be stopped
+            self._stop(Fault.NO_TORQUE, f"At t = {t} s the controller failed: {_one_line(error)}.")
+            return False
+        if not off <= self._tolerances.tracking:
+            why = f"off the controller's reference by {off:.3g} rad or m"
+            self._stop(Fault.OFF_COURSE, f"At t = {t} s the arm is {why}.")
+        elif tau.shape == limit.shape and _takes(tau, limit, self._tau):
+            return True
+        else:
+            why = f"{_one_line(tau)}, and the limits are {_one_line(limit)}"
+            self._stop(Fault.NO_TORQUE, f"At t = {t} s the controller gave {why}.")
+        return False
+
+    def _own_time(self, t: float) -> float:
+        if self._began is None:
+            self._began = t
+        return t - self._began
+
+    def _brake_or_hold(self, dt: float) -> None:
+        if not self._knows_state:
+            self._tau[:] = 0.0
+            return
+        if self._brakes_anew:
+            self._brake.begin(*self._state, is_gentle=self._has_rested)
+            self._brakes_anew, dt = False, 0.0
+        tau = self._brake.torque(*self._state, dt)
+        self._has_rested |= self._brake.is_holding
+        if not _takes(tau, self._arm.limits.effort, self._tau):
+            self._tau[:] = 0.0
+
+
+def _one_line(text: object) -> str:
+    return " ".join(str(text).split())[:300]
+
+
+@compiled
+def _is_plausible(q: Array, v: Array, farthest: float, fastest: Array) -> bool:
+    is_plausible = True
+    for x in q:
+        is_plausible &= abs(x) <= farthest
+    for i in range(v.size):
+        is_plausible &= abs(v[i]) <= fastest[i]
+    return is_plausible
+
+
+@compiled
+def _takes(tau: Array, limit: Array, out: Array) -> bool:
+    """Copy a torque if it is finite and within the limits up to rounding, clipped to them."""
+    for i in range(tau.size):
+        if not (math.isfinite(tau[i]) and abs(tau[i]) <= limit[i] * (1.0 + _ROUNDING)):
+            return False
+    for i in range(tau.size):
+        most = limit[i]
+        out[i] = most if tau[i] > most else -most if tau[i] < -most else tau[i]
+    return True

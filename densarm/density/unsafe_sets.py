@@ -1,0 +1,229 @@
+"""Unsafe sets: where the density vanishes, and how far away it is sensed."""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from densarm.arms.arm import Arm
+from densarm.density.inverse_bump import log_inverse_bump
+from densarm.errors import InvalidValueError
+from densarm.values.arrays import Array
+from densarm.values.checks import non_negative, positive, positive_array
+from densarm.values.documented import documented
+from densarm.values.kernels import compiled
+from densarm.world.active_pairs import ActivePairs
+from densarm.world.distance_view import add_pair_gradient
+from densarm.world.world import World
+
+_Function = Callable[[Array], tuple[float, Array]]
+
+_LARGEST_SHARE = 0.5  # with more, neighbouring sub-goals would be out of sight of each other
+
+
+@documented
+@dataclass(frozen=True)
+class SensingParameters:
+    """How far from unsafe sets the density changes.
+
+    Raises:
+        InvalidValueError: a value out of its range.
+    """
+
+    distance: float = 0.05
+    """Largest sensing distance σ of a geometry pair [m]."""
+    path_share: float = 0.3
+    """σ is at most this share of the path's own clearance, so that Ψ = 1 on the path."""
+    joint: float = 0.1
+    """Largest sensing distance of a joint limit [rad or m]."""
+
+    def __post_init__(self) -> None:
+        positive("distance", self.distance)
+        positive("joint", self.joint)
+        if not 0.0 < self.path_share <= _LARGEST_SHARE:
+            allowed = f"above 0 and at most {_LARGEST_SHARE}"
+            raise InvalidValueError("path_share", self.path_share, allowed)
+
+
+class UnsafeSet(Protocol):
+    """A family of unsafe sets {h_k ≤ 0}, each with its sensing region {s_k ≤ 0}."""
+
+    def add_log_bump(self, q: Array, theta: float, out_gradient: Array) -> float:
+        r"""Sum ln Ψ over the members and add the gradient of the sum in place.
+
+        .. math:: \sum_k \ln\Psi_k(q), \qquad \nabla \sum_k \ln\Psi_k(q)
+
+        Args:
+            q: configuration, shape (nq,).
+            theta: shift θ ≥ 0 of the inverse bumps, dimensionless.
+            out_gradient: tangent-space gradient, shape (nv,), added to.
+
+        Returns:
+            Σ ln Ψ_k; −inf in contact for θ = 0.
+
+        Source: [ZNV] eq. 7-8.
+        """
+        ...
+
+
+class ClearanceSet:
+    r"""Configurations at which a pair of bodies is closer than a margin.
+
+    .. math:: h_k(q) = d_k(q) - m, \qquad s_k(q) = h_k(q) - \sigma_k
+
+    Beyond its sensing region a pair adds the constant ln(1 + θ), so that one known to be that far
+    needs no query: the cost grows with the pairs near their sensing regions.
+
+    Args:
+        world: the pairs.
+        margin: m ≥ 0 [m].
+        sensing_distance: σ > 0 [m], one for all pairs or shape (K,).
+        pairs: which of them are near, for this set alone; None for active pairs of its own.
+
+    Attributes:
+        pairs: the active pairs, updated to the last configuration.
+
+    Raises:
+        InvalidValueError: a negative margin, or a sensing distance that is not positive.
+    """
+
+    def __init__(
+        self,
+        world: World,
+        margin: float,
+        sensing_distance: ArrayLike,
+        pairs: ActivePairs | None = None,
+    ) -> None:
+        self.world = world
+        self.pairs = pairs or ActivePairs(world)
+        self.margin = non_negative("margin", margin)
+        self.sensing_distance = positive_array("sensing_distance", sensing_distance, world.n_pairs)
+        """σ_k (K,) [m], to be changed by `set_sensing_distance`."""
+        self.set_sensing_distance(self.sensing_distance)
+
+    def set_sensing_distance(self, sensing_distance: Array) -> None:
+        """Sense the pairs at other distances from now on, σ > 0 (K,) [m]."""
+        self.sensing_distance[:] = sensing_distance
+        np.add(self.margin, self.sensing_distance, out=self.pairs.reach)
+
+    def add_log_bump(self, q: Array, theta: float, out_gradient: Array) -> float:
+        """Act as `UnsafeSet.add_log_bump`."""
+        pairs = self.pairs
+        pairs.update(q)
+        return _add_active_log_bumps(
+            pairs.state,
+            pairs.rows,
+            pairs.kinematics.jacobian,
+            self.world.sign,
+            self.margin,
+            self.sensing_distance,
+            theta,
+            out_gradient,
+        )
+
+
+class JointLimitSet:
+    r"""Configurations at or beyond a position limit of a bounded joint.
+
+    .. math:: h = q_i - q_i^{\min}, \quad h = q_i^{\max} - q_i, \quad s = h - \sigma_i
+
+    Args:
+        arm: its limits.
+        sensing_distance: σ > 0 [rad or m], one for all joints or shape (nv,).
+
+    Raises:
+        InvalidValueError: a sensing distance that is not positive.
+    """
+
+    def __init__(self, arm: Arm, sensing_distance: ArrayLike) -> None:
+        limits = arm.limits
+        width = positive_array("sensing_distance", sensing_distance, arm.nv)
+        bounds = np.concatenate([limits.lower, limits.upper])
+        members = np.flatnonzero(np.isfinite(bounds) & ~np.tile(arm.continuous, 2))
+        joint = members % arm.nv
+        self.index = np.array([joint, arm.idx_q[joint]], dtype=np.int64)
+        """Where in the tangent space and in q each limited joint is (2, M)."""
+        side = np.where(members < arm.nv, 1.0, -1.0)
+        self.member = np.array([bounds[members], side, width[joint]])
+        """Limits [rad or m], 1 for a lower and -1 for an upper one, and σ [rad or m] (3, M)."""
+
+    def set_sensing_distance(self, sensing_distance: Array) -> None:
+        """Sense the limits at other distances from now on, σ > 0 (nv,) [rad or m]."""
+        self.member[2] = sensing_distance[self.index[0]]
+
+    def add_log_bump(self, q: Array, theta: float, out_gradient: Array) -> float:
+        """Act as `UnsafeSet.add_log_bump`."""
+        return _add_limit_log_bumps(q, self.index, self.member, theta, out_gradient)
+
+
+class ImplicitSet:
+    r"""The set {h ≤ 0} in Rⁿ with the sensing region {s ≤ 0}, both given as functions.
+
+    .. math:: \Phi = \bar f\!\left(\frac{h}{h - s}\right)
+
+    Args:
+        h: smooth function of q, shape (n,), returning its value and its gradient, shape (n,).
+        s: likewise, in the unit of `h`; below `h` wherever h ≤ 0, so that the sensing region
+            contains the unsafe set.
+
+    Source: [ZNV] eq. 2, 3 and 7.
+    """
+
+    def __init__(self, h: _Function, s: _Function) -> None:
+        self.h = h
+        self.s = s
+
+    def add_log_bump(self, q: Array, theta: float, out_gradient: Array) -> float:
+        """Act as `UnsafeSet.add_log_bump`.
+
+        Raises:
+            InvalidValueError: s ≥ h at a configuration of the unsafe set.
+        """
+        h, h_gradient = self.h(q)
+        s, s_gradient = self.s(q)
+        if h <= 0.0 and s >= h:
+            raise InvalidValueError("sensing function s", s, f"below h = {h} wherever h <= 0")
+        value, slope = log_inverse_bump(h, h - s, theta)
+        if slope != 0.0:
+            t = max(h / (h - s), 0.0)
+            out_gradient += slope * ((1.0 - t) * h_gradient + t * s_gradient)
+        return value
+
+
+@compiled
+def _add_active_log_bumps(
+    state: NDArray[np.int64],
+    rows: Array,
+    jacobian: Array,
+    sign: Array,
+    margin: float,
+    width: Array,
+    theta: float,
+    out_gradient: Array,
+) -> float:
+    total, far = 0.0, math.log1p(theta)
+    for k in range(state.shape[0]):
+        if state[k] == 0:
+            total += far
+            continue
+        value, slope = log_inverse_bump(rows[k, 0] - margin, width[k], theta)
+        total += value
+        if slope != 0.0:
+            add_pair_gradient(rows[k], jacobian, sign[k], slope, out_gradient)
+    return total
+
+
+@compiled
+def _add_limit_log_bumps(
+    q: Array, index: NDArray[np.int64], member: Array, theta: float, out_gradient: Array
+) -> float:
+    total = 0.0
+    for m in range(member.shape[1]):
+        bound, side, width = member[0, m], member[1, m], member[2, m]
+        value, slope = log_inverse_bump(side * (q[index[1, m]] - bound), width, theta)
+        total += value
+        out_gradient[index[0, m]] += slope * side
+    return total

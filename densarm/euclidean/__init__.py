@@ -1,0 +1,1 @@
+"""The density on Rⁿ of [ZNV] III and IV, and the figures of the paper that no arm is in."""

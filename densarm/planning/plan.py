@@ -1,0 +1,278 @@
+"""From a start and a goal to a path of sub-goals, and to the motion along it."""
+
+import math
+import time
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from densarm.arms.arm import Arm
+from densarm.density.goal_distance import GoalDistance, TorusDistance
+from densarm.density.navigation_density import DensityParameters
+from densarm.density.sub_goals import GuidedDensity, GuidePath, SubGoals
+from densarm.density.unsafe_sets import SensingParameters
+from densarm.errors import InvalidValueError
+from densarm.planning.guide import Guide, NoPath
+from densarm.planning.integral_curve import IntegralCurve, integral_curve
+from densarm.planning.motion import Motion, PlanningError, TimingParameters
+from densarm.planning.path_guide import PathGuide, PathGuideParameters
+from densarm.values.arrays import Array
+from densarm.values.checks import non_negative, non_negative_integer, one_of
+from densarm.values.outcome import Outcome
+from densarm.world.configurations import infeasibility
+from densarm.world.separating_planes import SeparatingPlanes
+from densarm.world.stopping import StoppingCheck, StoppingTrajectory
+from densarm.world.swept_check import SweptCheck
+from densarm.world.world import World
+
+GUIDES = ("path", "direct")
+"""Names of guides: a collision-free path by OMPL, or the goal alone, as in [ZNV]."""
+
+PATH_MARGIN = 0.02
+"""Distance that paths keep beyond m, less in narrow spaces and near start and goal [m]."""
+
+PLANNING_ALPHA = 10.0
+"""α of the planning system where its curve is tracked, so that its direction alone counts.
+
+The larger, the closer to obstacles ρ leads, and the fewer its spurious maxima: [ZNV] Remark 3
+takes 1 to 10.
+"""
+
+_LIMIT_INSET = 0.002  # [rad or m] from position limits at which a motion leaves and arrives
+
+# Shares of the path margin and of the planner's iterations, tried in turn: most spaces are wide,
+# and a narrow passage may leave less distance than wanted. Where not all are to be spent, those
+# that are draw samples near both ends above all.
+_ATTEMPTS = ((1.0, 0.01), (0.25, 1.0), (0.05, 1.0))
+
+_END_SHARE = 0.5  # of the clearance at start and goal that a path's margin may take
+_SMOOTH_SHARE = 0.5  # of a path's or curve's distance margin that the smooth path keeps
+_STOP_SHARE = 0.5  # of the smooth path's that stopping keeps too; the rest is for tracking errors
+
+
+@dataclass(frozen=True, eq=False)
+class PlannedPath:
+    """A guide's answer, and what was kept from obstacles on the way."""
+
+    path: GuidePath
+    """The sub-goals."""
+    distance_margin: float
+    """Distance that the path keeps beyond the safety margin [m]."""
+    plan_time: float
+    """Wall-clock time that the guide took [s]; zero for the direct guide."""
+
+
+def plan_motion(
+    world: World,
+    start: ArrayLike,
+    goal: ArrayLike,
+    guide: str | Guide = "path",
+    *,
+    margin: float = 0.0,
+    seed: int = 0,
+    path_margin: float = PATH_MARGIN,
+    alpha: float = PLANNING_ALPHA,
+    kappa: float = 1.0,
+    period: float = 0.001,
+    density: DensityParameters = DensityParameters(),
+    sensing: SensingParameters = SensingParameters(),
+    search: PathGuideParameters = PathGuideParameters(),
+    timing: TimingParameters = TimingParameters(),
+) -> Motion:
+    """Plan a motion: sub-goals, the integral curve of ρ along them, a smooth path, its timing.
+
+    Where the curve from the start gets stuck, and the one from the goal with the start as its goal
+    does not, it is the second one, gone backwards. The motion is proved clear, under the safety
+    margin, as are the stopping trajectories from it.
+
+    Args:
+        world: the arm among obstacles.
+        start: configuration (nq,).
+        goal: configuration (nq,).
+        guide: supplies the sub-goals: "path", "direct" or a `Guide`.
+        margin: safety margin m [m]; it must hold at start and goal too.
+        seed: of the guide's random choices.
+        path_margin: distance that paths keep beyond m [m].
+        alpha: α of the planning system.
+        kappa: κ of its goal distance.
+        period: time between the motion's knots, for which torques will be held [s].
+        density: θ and gauge of the planning system.
+        sensing: sensing distances.
+        search: how long and how finely a path is searched.
+        timing: shares of the limits that the motion may use.
+
+    Raises:
+        PlanningError: there is no motion, with the outcome and the reason.
+        InvalidValueError: no configuration, an unknown guide, or a value out of its range.
+    """
+    planned = plan_path(
+        world, start, goal, guide, margin=margin, seed=seed, path_margin=path_margin, search=search
+    )
+    path, check = planned.path, SweptCheck(world, margin)
+    distance = TorusDistance(world.arm, kappa=kappa)
+    curve = _curve(check, path, distance, replace(density, alpha=alpha), sensing)
+    points = np.vstack([start, curve.q])
+    kept = _SMOOTH_SHARE * planned.distance_margin
+    if not path.is_clear:  # nor is the curve, but its steps are a share of its clearance
+        kept = max(0.0, min(kept, _SMOOTH_SHARE * check.least_distance_margin(points)))
+    motion = replace(
+        _timed(world, margin, kept, points, period, timing),
+        margin=margin,
+        path=path,
+        plan_time=planned.plan_time,
+        detail=curve.detail,
+    )
+    if not curve.reached:
+        raise PlanningError(Outcome.STUCK, curve.detail, motion)
+    return motion
+
+
+def plan_path(
+    world: World,
+    start: ArrayLike,
+    goal: ArrayLike,
+    guide: str | Guide = "path",
+    *,
+    margin: float = 0.0,
+    seed: int = 0,
+    path_margin: float = PATH_MARGIN,
+    search: PathGuideParameters = PathGuideParameters(),
+) -> PlannedPath:
+    """Plan sub-goals alone, for a controller that follows them without a timed motion.
+
+    Args and errors as for `plan_motion`.
+    """
+    arm, check = world.arm, SweptCheck(world, margin)
+    start, goal = arm.check_configuration("start", start), arm.check_configuration("goal", goal)
+    non_negative_integer("seed", seed)
+    if isinstance(guide, str):
+        one_of("guide", guide, GUIDES)
+    if fault := infeasibility(check, {"start": start, "goal": goal}):
+        raise PlanningError(Outcome.INFEASIBLE, fault)
+    depart, arrive = (inside_limits(check, q) for q in (start, goal))
+    ends = check.least_distance_margin(np.stack([start, depart, arrive]))
+    least = max(0.0, _END_SHARE * ends)
+    kept = min(non_negative("path_margin", path_margin), least)
+    if guide == "path":
+        return _searched(world, margin, depart, arrive, path_margin, least, search, seed)
+    if isinstance(guide, str):
+        # Not claimed to be clear: the density bends around what blocks it, or gets stuck there.
+        return PlannedPath(GuidePath(np.stack([depart, arrive]), is_clear=False), kept, 0.0)
+    began = time.perf_counter()
+    path = _checked(arm, guide.plan(depart, arrive, seed), depart, arrive)
+    elapsed = time.perf_counter() - began
+    if path.is_clear:
+        kept = min(kept, max(0.0, check.least_distance_margin(path.waypoints)))
+    return PlannedPath(path, kept, elapsed)
+
+
+def _searched(
+    world: World,
+    margin: float,
+    start: Array,
+    goal: Array,
+    path_margin: float,
+    least: float,
+    search: PathGuideParameters,
+    seed: int,
+) -> PlannedPath:
+    """Search a path under ever smaller margins; `least` of both ends bounds them [m]."""
+    # Of attempts with the same margin the last counts, which is the most thorough.
+    attempts = {min(share * path_margin, least): effort for share, effort in _ATTEMPTS}
+    spaces = {kept: SeparatingPlanes(world, margin + kept) for kept in attempts}
+    began = time.perf_counter()
+    for kept, effort in attempts.items():
+        parameters = search
+        if effort < 1.0:
+            iterations = math.ceil(effort * search.iterations)
+            parameters = replace(search, iterations=iterations, near_share=1.0, searches=1)
+        path = PathGuide(world.arm, spaces[kept], parameters).plan(start, goal, seed)
+        if isinstance(path, GuidePath):
+            return PlannedPath(path, kept, time.perf_counter() - began)
+        reason = path.reason
+    tried = ", ".join(f"{1e3 * (margin + kept):.3g}" for kept in attempts)
+    raise PlanningError(Outcome.NO_PATH, f"{reason}, with margins of {tried} mm")
+
+
+def _checked(arm: Arm, answer: object, start: Array, goal: Array) -> GuidePath:
+    """Return the path that somebody's own guide found, once it is known to be one."""
+    if isinstance(answer, NoPath):
+        raise PlanningError(Outcome.NO_PATH, answer.reason)
+    if not isinstance(answer, GuidePath):
+        raise InvalidValueError("answer of the guide", answer, "a GuidePath or a NoPath")
+    what, allowed = "waypoints of the guide", f"of shape (W, {arm.nq}), W >= 2"
+    try:
+        points = np.asarray(answer.waypoints, dtype=np.float64)
+    except (TypeError, ValueError):  # no numbers, or rows of different lengths
+        raise InvalidValueError(what, answer.waypoints, allowed) from None
+    if points.ndim != 2 or len(points) < 2 or points.shape[1] != arm.nq:
+        raise InvalidValueError(what, answer.waypoints, f"{allowed}, got {points.shape}")
+    checked = [arm.check_configuration("waypoint of the guide", point) for point in points]
+    for name, at, q in (("first", 0, start), ("last", -1, goal)):
+        if np.abs(arm.difference(q, checked[at])).max() > _LIMIT_INSET:
+            allowed = f"the {'start' if at == 0 else 'goal'} {q.tolist()}"
+            raise InvalidValueError(f"{name} waypoint of the guide", checked[at], allowed)
+    return GuidePath(np.array(checked), bool(answer.is_clear))
+
+
+def _curve(
+    check: SweptCheck,
+    path: GuidePath,
+    goal_distance: GoalDistance,
+    parameters: DensityParameters,
+    sensing: SensingParameters,
+) -> IntegralCurve:
+    """Return the planning system's curve.
+
+    On a path that is proved clear nothing is sensed, the sensing distances being below the
+    path's own clearance: the density leads from each sub-goal straight to the next.
+    """
+    if path.is_clear:
+        return IntegralCurve(path.waypoints, reached=True, detail="")
+
+    def from_end(path: GuidePath) -> IntegralCurve:
+        guided = GuidedDensity(check, SubGoals(check, path, sensing), goal_distance, parameters)
+        return integral_curve(guided, check.margin, path.waypoints[0])
+
+    curve = from_end(path)
+    if not curve.reached:
+        # A goal lies in narrow space more often than a start, and leaving is easier than entering.
+        returned = from_end(GuidePath(path.waypoints[::-1], is_clear=False))
+        if returned.reached:
+            return replace(returned, q=returned.q[::-1])
+    return curve
+
+
+def _timed(
+    world: World, margin: float, kept: float, curve: Array, period: float, timing: TimingParameters
+) -> Motion:
+    """Return a smooth motion near a curve (N, nq) that keeps so much beyond the margin [m]."""
+    arm = world.arm
+    length = float(np.linalg.norm(arm.difference(curve[:-1], curve[1:]), axis=1).sum())
+    if length == 0.0:
+        rest = np.tile(arm.angles(curve[0]), (2, 1))
+        return Motion(period, rest, np.zeros_like(rest))
+    # TOPP-RA takes a tenth of a second to import.
+    from densarm.planning.smoothing import smooth_path
+    from densarm.planning.timing import time_path
+
+    path = smooth_path(world, margin + kept, curve)
+    if path is None:
+        reason = "no smooth path near the planning system's curve is proved clear"
+        raise PlanningError(Outcome.NO_PATH, reason)
+    stops = StoppingTrajectory(arm, timing.acceleration_share, timing.torque_share)
+    stopping = StoppingCheck(world, stops, margin + _STOP_SHARE * kept)
+    return time_path(arm, path, length, period, timing, stopping)
+
+
+def inside_limits(check: SweptCheck, q: Array) -> Array:
+    """Return where to leave or to reach q (nq,), at which the density must not vanish.
+
+    A configuration at a position limit is on the rim of an unsafe set. The motion keeps a little
+    inside, well within what counts as reached, unless something touches there.
+    """
+    arm, limits = check.arm, check.arm.limits
+    low, high = limits.lower + _LIMIT_INSET, limits.upper - _LIMIT_INSET
+    inside = arm.configurations(np.clip(arm.angles(q), low, high))
+    return inside if check.segment_is_clear(q, inside) else q

@@ -1,0 +1,135 @@
+"""SmoothPath: a twice differentiable curve near the planning system's, proved clear."""
+
+import numpy as np
+
+from densarm.values.arrays import Array
+from densarm.world.separating_planes import SeparatingPlanes, configuration_tube
+from densarm.world.swept_check import SweptCheck, SweptVerdict
+from densarm.world.world import World
+
+_DEGREE = 3
+_WIDEST = 0.8  # [rad] between control points at first
+_HALVINGS = 9
+_SAMPLE = 0.01  # [rad] at most between the samples that the proof uses at first
+_PARTS = 4  # at least, that each polynomial piece is sampled in
+_LARGEST_GROUP = 64  # chords that are proved at once
+_DOUBLINGS = 5  # of the samples; the spline's departure from its chords falls with their square
+
+
+class SmoothPath:
+    """A cubic B-spline θ(s) in joint positions, s in [0, 1], with its derivatives.
+
+    SciPy has these too, but takes longer to import than a motion takes to plan.
+
+    Args:
+        knots: where pieces meet (C + 4,), from 0 to 1, at each end four times.
+        control: control points (C, nv) [rad or m].
+
+    Source: de Boor, A Practical Guide to Splines, ch. X.
+    """
+
+    path_interval = 0.0, 1.0  # as TOPP-RA calls it
+
+    def __init__(self, knots: Array, control: Array) -> None:
+        self.knots = knots
+        self._control = [control]  # of each derivative
+        for degree in (_DEGREE, _DEGREE - 1):
+            own = self._knots(_DEGREE - degree)
+            width = own[degree + 1 : -1] - own[1 : -degree - 1]
+            slope = np.diff(self._control[-1], axis=0) / width[:, np.newaxis]
+            self._control.append(degree * slope)
+
+    def __call__(self, s: float | Array, order: int = 0) -> Array:
+        """Return θ(s), or its derivative of order 1 or 2, shape (..., nv)."""
+        degree, knots, control = _DEGREE - order, self._knots(order), self._control[order]
+        at = np.asarray(s, dtype=np.float64)
+        piece = np.clip(np.searchsorted(knots, at, side="right") - 1, degree, len(control) - 1)
+        first = piece - degree
+        points = [control[first + j] for j in range(degree + 1)]
+        for level in range(1, degree + 1):
+            for j in range(degree, level - 1, -1):
+                low, high = knots[first + j], knots[piece + j + 1 - level]
+                share = np.asarray((at - low) / (high - low))[..., np.newaxis]
+                points[j] = (1.0 - share) * points[j - 1] + share * points[j]
+        return np.asarray(points[degree])
+
+    def _knots(self, order: int) -> Array:
+        """Return the knots of a derivative: each end stands there once less for each order."""
+        return self.knots[order : len(self.knots) - order]
+
+
+def smooth_path(world: World, margin: float, curve: Array) -> SmoothPath | None:
+    """Return a C² path with the ends of a polyline (N, nq), proved clear beyond a margin [m].
+
+    Control points of a clamped uniform cubic B-spline are taken from the polyline at equal
+    distances. Each piece of the spline stays in the convex hull of four of them, so that it tends
+    to the polyline as they get denser: their distance is halved until the path is proved clear.
+    None if even the densest gave no such path.
+
+    Source: convex hull property: de Boor, A Practical Guide to Splines, ch. IX.
+    """
+    arm = world.arm
+    steps = arm.difference(curve[:-1], curve[1:])
+    corner = arm.angles(curve[0]) + np.vstack([np.zeros(arm.nv), np.cumsum(steps, axis=0)])
+    length = np.append(0.0, np.cumsum(np.linalg.norm(steps, axis=1)))
+    proof = _MotionProof(world, margin)
+    for halving in range(_HALVINGS):
+        count = max(_DEGREE + 1, 1 + int(np.ceil(length[-1] * 2.0**halving / _WIDEST)))
+        at = np.linspace(0.0, length[-1], count)
+        control = np.column_stack([np.interp(at, length, column) for column in corner.T])
+        inner = np.linspace(0.0, 1.0, count - _DEGREE + 1)
+        path = SmoothPath(np.pad(inner, _DEGREE, mode="edge"), control)
+        if _is_clear(proof, path, length[-1]):
+            return path
+    return None
+
+
+def _is_clear(proof: "_MotionProof", path: SmoothPath, length: float) -> bool:
+    """Return whether the path is proved clear, sampled ever finer until that is decided."""
+    knots = np.unique(path.knots)
+    pieces = len(knots) - 1
+    parts = max(_PARTS, int(np.ceil(length / pieces / _SAMPLE)))  # of each polynomial piece
+    for doubling in range(_DOUBLINGS):
+        count = parts * 2**doubling
+        s = np.interp(np.arange(count * pieces + 1) / count, np.arange(pieces + 1), knots)
+        # The second derivative is linear between samples, so that it is largest at one of them.
+        curvature = np.abs(path(s, 2))
+        largest = np.maximum(curvature[:-1], curvature[1:])
+        verdict = proof.verdict(path(s), largest / 8.0 * np.diff(s)[:, np.newaxis] ** 2)
+        if verdict != SweptVerdict.UNDECIDED:
+            break
+    return verdict == SweptVerdict.CLEAR
+
+
+class _MotionProof:
+    """Proves what `SweptCheck` does, in configuration tubes around many chords each.
+
+    A chord in no tube that is proved clear is left to `SweptCheck` and its exact distances.
+    """
+
+    def __init__(self, world: World, margin: float) -> None:
+        self._planes = SeparatingPlanes(world, margin)
+        self._swept = SweptCheck(world, margin)
+
+    def verdict(self, angles: Array, departure: Array) -> SweptVerdict:
+        """Return whether the motion through joint positions (N, nv) [rad or m] is proved clear.
+
+        It departs from each chord by a bound per joint (N - 1, nv) [rad or m] at most.
+        """
+        last = len(departure)
+        waiting = [(a, min(a + _LARGEST_GROUP, last)) for a in range(0, last, _LARGEST_GROUP)]
+        while waiting:
+            a, b = waiting.pop()
+            points, off = angles[a : b + 1], departure[a:b].max(axis=0)
+            tube = configuration_tube(points, points[-1] - points[0])
+            if self._planes.tube_is_clear(tube._replace(radius=tube.radius + off)):
+                continue
+            if b - a > 1:
+                m = (a + b) // 2
+                waiting += [(a, m), (m, b)]
+                continue
+            q = self._swept.arm.configurations(points)
+            result = self._swept.check(q, departure[a:b])
+            if result.verdict != SweptVerdict.CLEAR:
+                return result.verdict
+        return SweptVerdict.CLEAR

@@ -1,1 +1,0 @@
-"""From a URDF and SRDF to the models of an arm."""

@@ -1,0 +1,1 @@
+"""Scenarios: a task from a TOML file, and what plans, drives, runs and records it."""

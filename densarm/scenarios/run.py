@@ -1,0 +1,205 @@
+"""A scenario's closed loop, from planning to the recorded outcome."""
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from densarm.certificates.records import (
+    EnergyRecord,
+    RantzerRecord,
+    no_energy,
+    record_energy,
+    record_rantzer,
+)
+from densarm.control.controller import Controller
+from densarm.control.regulation import DensityRegulation
+from densarm.control.replanning import Replanning
+from densarm.control.tracking import DensityTracking
+from densarm.density.goal_distance import InertiaDistance, TorusDistance
+from densarm.density.navigation_density import density_towards
+from densarm.planning.guide import Guide
+from densarm.planning.motion import Motion, PlanningError
+from densarm.planning.plan import GUIDES, inside_limits, plan_motion, plan_path
+from densarm.scenarios.scenario import ControlForm, Scenario, load_scenario
+from densarm.simulation.run import Run
+from densarm.simulation.simulate import OnProgress, simulate_task
+from densarm.values.arrays import Array
+from densarm.values.checks import one_of
+from densarm.values.outcome import Outcome
+from densarm.world.swept_check import SweptCheck
+
+
+@dataclass(frozen=True, eq=False)
+class Drive:
+    """What drives an arm to its goal."""
+
+    controller: Controller
+    plan_time: float = 0.0
+    """Wall-clock time that its guide took [s], if it has one."""
+    motion: Motion | None = None
+    """What the controller tracks, if it does."""
+
+
+Baseline = Callable[[Scenario], Drive]
+"""A way to drive a scenario's arm; it raises `PlanningError` where it has none."""
+
+
+def run(
+    scenario: Scenario | str | Path,
+    guide: Guide | str | None = None,
+    seed: int | None = None,
+    on_progress: OnProgress = lambda _: None,
+) -> Run:
+    """Plan and run a scenario's torque-driven closed loop.
+
+    Args:
+        scenario: what to run: a `Scenario`, a known name, or the path of a TOML file.
+        guide: "path", "direct" or a `Guide`; None for the scenario's own.
+        seed: of the guide's random choices; None for the scenario's own.
+        on_progress: told what is being done.
+
+    Returns:
+        The recorded run, its guide and seed as they were. Whatever happened is its `outcome`, not
+        an exception. The same scenario and seed give the same run, bit for bit.
+
+    Raises:
+        InvalidValueError: a guide of an unknown name, or a seed that is not a whole number.
+        DensarmError: a scenario that cannot be loaded.
+    """
+    chosen = scenario if isinstance(scenario, Scenario) else load_scenario(scenario)
+    if isinstance(guide, str):
+        control = replace(chosen.control, guide=one_of("guide", guide, GUIDES))
+        chosen = replace(chosen, control=control)
+    if seed is not None:
+        chosen = replace(chosen, seed=seed)
+    own = None if guide is None or isinstance(guide, str) else guide
+    return run_by(chosen, lambda scenario: by_density(scenario, own), on_progress)
+
+
+def run_by(scenario: Scenario, baseline: Baseline, on_progress: OnProgress = lambda _: None) -> Run:
+    """Run a scenario's torque-driven closed loop by any way to drive the arm, as `run`."""
+    began = time.perf_counter()
+    world, task = scenario.world, scenario.task
+    on_progress("planning")
+    try:
+        drive = baseline(scenario)
+    except PlanningError as error:
+        ended = Run.at_rest(task, world, error.outcome, error.detail)
+        searched = error.outcome == Outcome.NO_PATH
+        return replace(ended, plan_time=time.perf_counter() - began if searched else 0.0)
+    elapsed = time.perf_counter() - began
+    done = simulate_task(task, world, drive.controller, on_progress=on_progress)
+    if done.outcome == Outcome.INFEASIBLE:
+        return done
+    return replace(done, plan_time=drive.plan_time, preparation_time=elapsed)
+
+
+def by_density(scenario: Scenario, guide: Guide | None = None, *, replans: bool = True) -> Drive:
+    """Return what drives an arm by the density, in the scenario's form and along its guide.
+
+    A guide replaces the scenario's own. Where the plan loses the arm there is a new one, if it
+    `replans`.
+
+    Raises:
+        PlanningError: there is no way, or, without a guide's path, the density is stuck at once.
+    """
+    drive = _plan(scenario, scenario.start, guide)
+    if not replans or (guide is None and scenario.control.guide == "direct"):
+        return drive
+
+    def plan_again(q: Array) -> Controller | None:
+        try:
+            return _plan(scenario, q, guide).controller
+        except PlanningError:
+            return None
+
+    controller = Replanning(
+        scenario.arm,
+        scenario.goal,
+        drive.controller,
+        plan_again,
+        patience=0.5 * scenario.simulation.stall_time,
+        gains=scenario.gains,
+        period=scenario.simulation.control_period,
+    )
+    return replace(drive, controller=controller)
+
+
+def _plan(scenario: Scenario, start: Array, guide: Guide | None) -> Drive:
+    world, control, period = scenario.world, scenario.control, scenario.simulation.control_period
+    goal, chosen = scenario.goal, control.guide if guide is None else guide
+    search: dict[str, Any] = {
+        "margin": control.margin,
+        "seed": scenario.seed,
+        "path_margin": control.path_margin,
+        "search": scenario.planning,
+    }
+    law: dict[str, Any] = {"density": scenario.density, "sensing": scenario.sensing}
+    distance = TorusDistance(scenario.arm, kappa=control.kappa)
+    if control.form != ControlForm.TRACKING:
+        planned = plan_path(world, start, goal, chosen, **search)
+        is_plain = control.form == ControlForm.PLAIN
+        regulation = DensityRegulation(
+            world,
+            goal,
+            path=planned.path,
+            plain=is_plain,
+            margin=control.margin,
+            gains=scenario.gains,
+            period=period,
+            goal_distance=None if is_plain else distance,
+            speed=scenario.speed,
+            **law,
+        )
+        return Drive(regulation, planned.plan_time)
+    try:
+        motion = plan_motion(
+            world,
+            start,
+            goal,
+            chosen,
+            **search,
+            **law,
+            alpha=control.planning_alpha,
+            kappa=control.kappa,
+            period=period,
+            timing=scenario.timing,
+        )
+    except PlanningError as error:
+        if error.motion is None:
+            raise
+        motion = error.motion  # the arm goes as far as the density leads, which the record shows
+    tracking = DensityTracking(world, motion, gains=scenario.gains, goal_distance=distance, **law)
+    return Drive(tracking, motion.plan_time, motion)
+
+
+def records(run: Run) -> tuple[EnergyRecord, RantzerRecord]:
+    """Return what is recorded of a run's energy and of Rantzer's condition along it.
+
+    Args:
+        run: its density is the plain one of the goal; nothing is recorded without a goal.
+    """
+    if run.task.goal is None:
+        return no_energy("no goal was given"), RantzerRecord(str(run.task.density.gauge))
+    scenario = Scenario.of_task(run.task)
+    world, control = scenario.world, scenario.control
+    goal = inside_limits(SweptCheck(world, control.margin), scenario.goal)
+    is_plain = control.form == ControlForm.PLAIN
+    density = density_towards(
+        world,
+        goal,
+        margin=control.margin,
+        kappa=control.kappa,
+        goal_distance=InertiaDistance(scenario.arm, goal) if is_plain else None,
+        parameters=scenario.density,
+        sensing=scenario.sensing,
+    )
+    if control.form != ControlForm.REGULATION:
+        energy = no_energy(f"control form {str(control.form)!r}, not 'regulation'")
+    elif control.guide != "direct":
+        energy = no_energy(f"guide {control.guide!r}, whose sub-goals change U, not 'direct'")
+    else:
+        energy = record_energy(run.task, density, scenario.gains, run.q, run.v, run.tau)
+    return energy, record_rantzer(run.task, density, run.q)

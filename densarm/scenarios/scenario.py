@@ -1,0 +1,269 @@
+"""Scenario: robot, scene, start, goal and parameters of one run, from TOML or JSON."""
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field, replace
+from enum import StrEnum
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+from densarm.arms.arm import Arm, load_arm
+from densarm.arms.catalogue import scenario_paths
+from densarm.certificates.task import SimulationParameters, Task
+from densarm.control.controller import Gains
+from densarm.control.speed_law import SpeedParameters
+from densarm.control.tracking import require_smooth_goal
+from densarm.density.goal_distance import KAPPA_MIN
+from densarm.density.navigation_density import DensityParameters
+from densarm.density.unsafe_sets import SensingParameters
+from densarm.errors import DensarmError, FileContentError, InvalidValueError, UnknownNameError
+from densarm.planning.motion import TimingParameters
+from densarm.planning.path_guide import PathGuideParameters
+from densarm.planning.plan import GUIDES, PATH_MARGIN, PLANNING_ALPHA
+from densarm.scene.loading import parse_scene
+from densarm.scene.scene import Scene
+from densarm.values.arrays import Array
+from densarm.values.checks import (
+    finite_vector,
+    non_negative,
+    non_negative_integer,
+    one_of,
+    positive,
+)
+from densarm.values.documented import documented
+from densarm.values.files import read_toml
+from densarm.values.tables import parse_table
+from densarm.world.world import World
+
+
+class ControlForm(StrEnum):
+    """Which density controller drives the arm."""
+
+    TRACKING = "tracking"
+    """Along the timed trajectory of the planning system, [ZNV] eq. 17."""
+    REGULATION = "regulation"
+    """To the goal by way of the sub-goals, [ZNV] eq. 17 with constant q_d."""
+    PLAIN = "plain"
+    """u = ∇ρ + d(q, q̇)."""
+
+
+@dataclass(frozen=True)
+class ControlParameters:
+    """Which controller, and the guide it follows.
+
+    Raises:
+        InvalidValueError: a value out of its range.
+    """
+
+    form: ControlForm = ControlForm.TRACKING
+    """The controller."""
+    guide: str = "path"
+    """The guide, unless the caller names another: "path" or "direct"."""
+    margin: float = 0.0
+    """Safety margin m: a pair is unsafe at this distance and below [m]."""
+    path_margin: float = PATH_MARGIN
+    """Distance that paths keep beyond m, less in narrow spaces and near start and goal [m]."""
+    kappa: float = 1.0
+    """κ of the goal distance, between product and sum; the plain form has the sum."""
+    planning_alpha: float = PLANNING_ALPHA
+    """α of the planning system where its curve is tracked."""
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "form", ControlForm(one_of("form", self.form, list(ControlForm))))
+        one_of("guide", self.guide, GUIDES)
+        non_negative("margin", self.margin)
+        non_negative("path_margin", self.path_margin)
+        positive("planning_alpha", self.planning_alpha)
+        if not self.kappa >= KAPPA_MIN:
+            raise InvalidValueError("kappa", self.kappa, f"a number >= {KAPPA_MIN}, or infinity")
+
+
+@documented
+@dataclass(frozen=True, eq=False)
+class Scenario:
+    """Everything that determines a run.
+
+    Raises:
+        InvalidValueError: start or goal is not a configuration, the seed is not a whole number,
+            or the density gives no feedback that settles at a goal.
+    """
+
+    name: str
+    """What messages and files call it."""
+    title: str
+    """What pages and pictures say above it."""
+    arm: Arm
+    """The arm, held bodies among it."""
+    scene: Scene
+    """The obstacles."""
+    start: Array
+    """Configuration at the start (nq,); `Arm.configuration` makes one from joint positions."""
+    goal: Array
+    """Configuration to reach (nq,)."""
+    control: ControlParameters = field(default_factory=ControlParameters)
+    """Guide, form of control and safety margin."""
+    density: DensityParameters = field(default_factory=DensityParameters)
+    """The density that feeds back."""
+    sensing: SensingParameters = field(default_factory=SensingParameters)
+    """From where on it senses obstacles and limits."""
+    planning: PathGuideParameters = field(default_factory=PathGuideParameters)
+    """How long and how finely a path is searched."""
+    timing: TimingParameters = field(default_factory=TimingParameters)
+    """Shares of the limits that a motion may use."""
+    speed: SpeedParameters = field(default_factory=SpeedParameters)
+    """Shares of the limits that regulation may use."""
+    gains: Gains = field(default_factory=Gains)
+    """K_p and K_v."""
+    simulation: SimulationParameters = field(default_factory=SimulationParameters)
+    """Time step, time limit and what counts as held or stuck."""
+    seed: int = 0
+    """Seed of every random choice."""
+
+    def __post_init__(self) -> None:
+        for key in ("start", "goal"):
+            q = self.arm.check_configuration(f"{key} configuration", getattr(self, key))
+            object.__setattr__(self, key, q)
+        non_negative_integer("seed", self.seed)
+        may_blend = self.control.form != ControlForm.TRACKING
+        require_smooth_goal(self.density, may_blend=may_blend)
+
+    @cached_property
+    def world(self) -> World:
+        """The arm among the obstacles, made when first asked for."""
+        return World(self.arm, self.scene)
+
+    @property
+    def task(self) -> Task:
+        """What a run of the scenario is about, its other parameters among the settings."""
+        return Task(
+            **{key: getattr(self, key) for key in _SHARED},
+            margin=self.control.margin,
+            kappa=self.control.kappa,
+            settings={"seed": self.seed, **{key: asdict(getattr(self, key)) for key in _SETTINGS}},
+        )
+
+    @classmethod
+    def of_task(cls, task: Task) -> "Scenario":
+        """Return the scenario that a recorded task came from; what it does not say is by default.
+
+        Raises:
+            DensarmError: a setting that is not one, or a task without a goal.
+        """
+        if task.goal is None:
+            raise InvalidValueError("goal", None, "given in a scenario")
+        settings = task.settings
+        control = {**settings.get("control", {}), "margin": task.margin, "kappa": task.kappa}
+        tables = {**settings, "control": control}
+        return cls(
+            **{key: getattr(task, key) for key in _SHARED},
+            seed=settings.get("seed", 0),
+            **{key: parse_table(key, TABLES[key], tables.get(key, {})) for key in _SETTINGS},
+        )
+
+
+TABLES: Mapping[str, type[Any]] = {
+    "control": ControlParameters,
+    "density": DensityParameters,
+    "sensing": SensingParameters,
+    "planning": PathGuideParameters,
+    "timing": TimingParameters,
+    "speed": SpeedParameters,
+    "gains": Gains,
+    "simulation": SimulationParameters,
+}
+"""The optional tables of a scenario file and what they hold."""
+
+_SETTINGS = ("control", "planning", "timing", "speed", "gains")  # that a task does not hold itself
+_SHARED = ("name", "title", "arm", "scene", "start", "goal", "density", "sensing", "simulation")
+_KEYS = {"title", "robot", "scene", "obstacles", "task", "seed", *TABLES}
+
+
+def load_scenario(scenario: str | Path) -> Scenario:
+    """Load a scenario by name or from a TOML file.
+
+    Args:
+        scenario: a known name (``densarm list``), or the path of a TOML file.
+
+    Raises:
+        UnknownNameError: no such scenario, robot, key or posture.
+        InvalidValueError: a value that is not allowed, with its key.
+        FileContentError: the file cannot be read, or is not TOML.
+    """
+    known = scenario_paths()
+    path = known.get(str(scenario), Path(scenario))
+    if str(scenario) not in known and path.suffix != ".toml" and not path.is_file():
+        raise UnknownNameError("scenario", scenario, [*known, "the path of a .toml file"])
+    data = read_toml(path)
+    try:
+        return _parse(path, data)
+    except FileContentError:
+        raise
+    except DensarmError as error:
+        raise FileContentError(path, str(error)) from None
+
+
+def _parse(path: Path, data: dict[str, Any]) -> Scenario:
+    for key in data:
+        if key not in _KEYS:
+            raise UnknownNameError("key", key, _KEYS)
+    arm = _parse_robot(path.parent, parse_table("robot", _RobotTable, data.get("robot", {})))
+    task = parse_table("task", _TaskTable, data.get("task", {}))
+    scene = parse_scene(path.parent, data.get("scene", ""), data.get("obstacles", []))
+    arm = arm.holding(*scene.attachments)
+    return Scenario(
+        name=path.stem,
+        title=str(data.get("title", path.stem)),
+        arm=arm,
+        scene=Scene(scene),
+        start=_configuration(arm, "task.start", task.start),
+        goal=_configuration(arm, "task.goal", task.goal),
+        seed=data.get("seed", 0),
+        **{key: parse_table(key, kind, data.get(key, {})) for key, kind in TABLES.items()},
+    )
+
+
+@dataclass(frozen=True)
+class _RobotTable:
+    name: str = ""
+    urdf: str = ""
+    srdf: str = ""
+    package_dirs: tuple[str, ...] = ()
+    joints: tuple[str, ...] | None = None
+    locked_joints: dict[str, float] = field(default_factory=dict)
+    cut_joints: tuple[str, ...] = ()
+    base_placement: tuple[float, float, float, float, float, float, float] | None = None
+    acceleration: tuple[float, ...] | None = None
+    shapes: str = "hull"
+    collision_from_visual: str | None = None
+
+
+@dataclass(frozen=True)
+class _TaskTable:
+    start: str | tuple[float, ...] = ()
+    goal: str | tuple[float, ...] = ()
+
+
+def _parse_robot(folder: Path, table: _RobotTable) -> Arm:
+    given = dict(vars(table))
+    name, urdf, srdf, folders = (given.pop(key) for key in ("name", "urdf", "srdf", "package_dirs"))
+    if bool(name) == bool(urdf):
+        allowed = "a table with either name or urdf"
+        raise InvalidValueError("robot", {"name": name, "urdf": urdf}, allowed)
+    changes = {key: given.pop(key) for key in ("base_placement", "acceleration")}
+    changes = {key: value for key, value in changes.items() if value is not None}
+    arm = load_arm(
+        name or folder / urdf,
+        srdf=folder / srdf if srdf else None,
+        package_dirs=[folder / item for item in folders],
+        **given,
+    )
+    return Arm(replace(arm.description, **changes)) if changes else arm
+
+
+def _configuration(arm: Arm, key: str, value: str | tuple[float, ...]) -> Array:
+    if isinstance(value, str):
+        if value not in arm.postures:
+            raise UnknownNameError(f"posture for {key}", value, arm.postures)
+        return arm.postures[value]
+    name = f"{key} (one number per joint, or a posture)"
+    return arm.configuration(finite_vector(name, value, arm.nv))

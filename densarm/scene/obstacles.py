@@ -1,0 +1,183 @@
+"""Obstacles: named bodies at fixed poses, as frozen values."""
+
+import math
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import coal
+import numpy as np
+import pinocchio as pin
+
+from densarm.errors import InvalidValueError
+from densarm.scene.shapes import box_hull, circumscribed_cylinder
+from densarm.values.arrays import Vector
+from densarm.values.checks import (
+    finite_number,
+    finite_tuple,
+    positive,
+    positive_tuple,
+    unit_quaternion,
+)
+from densarm.values.documented import documented
+
+
+@dataclass(frozen=True, kw_only=True)
+class Obstacle(ABC):
+    """A named body at a fixed pose, the union of convex shapes. Its vectors are kept as tuples.
+
+    Raises:
+        InvalidValueError: no name, a number that is not finite, no unit quaternion, or, of any
+            kind of obstacle, a size that is not positive.
+    """
+
+    _SIZES: ClassVar[tuple[str, ...]] = ()
+    """Fields that are positive numbers."""
+
+    name: str
+    """What messages call it; one body of a scene has it."""
+    position: Vector = (0.0, 0.0, 0.0)
+    """Origin of the body's frame in the world, or in the frame of the link that holds it [m]."""
+    orientation_xyzw: Vector = (0.0, 0.0, 0.0, 1.0)
+    """Unit quaternion x y z w of that frame."""
+
+    def __post_init__(self) -> None:
+        name = self.name
+        if not isinstance(name, str) or not name:
+            raise InvalidValueError("obstacle name", name, "a non-empty string")
+        quaternion = unit_quaternion(f"{name}.orientation_xyzw", self.orientation_xyzw)
+        position = finite_tuple(f"{name}.position", self.position, 3)
+        self._store(position=position, orientation_xyzw=quaternion)
+        self._store(**{key: positive(f"{name}.{key}", getattr(self, key)) for key in self._SIZES})
+
+    @abstractmethod
+    def convex_shapes(self) -> tuple[coal.CollisionGeometry, ...]:
+        """Return the shapes, in the body's frame, whose distances coal differentiates."""
+
+    def _store(self, **values: Any) -> None:
+        """Set fields while the obstacle is being made."""
+        for field, value in values.items():
+            object.__setattr__(self, field, value)
+
+
+@documented
+@dataclass(frozen=True, kw_only=True)
+class Sphere(Obstacle):
+    """A ball."""
+
+    _SIZES = ("radius",)
+
+    radius: float
+    """Radius [m]."""
+
+    def convex_shapes(self) -> tuple[coal.CollisionGeometry, ...]:
+        """Return coal's sphere."""
+        return (coal.Sphere(self.radius),)
+
+
+@documented
+@dataclass(frozen=True, kw_only=True)
+class Box(Obstacle):
+    """A box with full side lengths along its own axes, its origin in the middle."""
+
+    size: Vector
+    """Full side lengths x y z [m]."""
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        self._store(size=positive_tuple(f"{self.name}.size", self.size, 3))
+
+    def convex_shapes(self) -> tuple[coal.CollisionGeometry, ...]:
+        """Return the hull of the corners, since coal's box errs where it nearly touches another."""
+        return (box_hull(self.size),)
+
+
+@documented
+@dataclass(frozen=True, kw_only=True)
+class Capsule(Obstacle):
+    """A cylinder along its own z axis with a half ball on each end, its origin in the middle."""
+
+    _SIZES = ("radius", "length")
+
+    radius: float
+    """Radius [m]."""
+    length: float
+    """Length between the centres of the half balls [m]."""
+
+    def convex_shapes(self) -> tuple[coal.CollisionGeometry, ...]:
+        """Return coal's capsule."""
+        return (coal.Capsule(self.radius, self.length),)
+
+
+@documented
+@dataclass(frozen=True, kw_only=True)
+class Cylinder(Obstacle):
+    """A cylinder along its own z axis; distances are to a circumscribed 64-sided prism."""
+
+    _SIZES = ("radius", "length")
+
+    radius: float
+    """Radius [m]."""
+    length: float
+    """Length [m]."""
+
+    def convex_shapes(self) -> tuple[coal.CollisionGeometry, ...]:
+        """Return the circumscribed prism, since coal's cylinder has no reliable gradient."""
+        return (circumscribed_cylinder(self.radius, self.length),)
+
+
+@documented
+@dataclass(frozen=True, kw_only=True)
+class HalfSpace(Obstacle):
+    """All points x of its frame with normal · x <= offset: a floor or a wall without end.
+
+    The floor z <= 0 by default. As with every obstacle, links that no joint moves may touch it.
+
+    Raises:
+        InvalidValueError: a normal of length zero, or a number that is not finite.
+    """
+
+    normal: Vector = (0.0, 0.0, 1.0)
+    """Direction from the solid into the free space; scaled to length one."""
+    offset: float = 0.0
+    """Distance of the surface from the frame's origin, along the normal [m]."""
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        normal = np.array(finite_tuple(f"{self.name}.normal", self.normal, 3))
+        length = math.hypot(*normal)
+        if not 1e-6 < length < 1e6:
+            raise InvalidValueError(f"{self.name}.normal", self.normal, "a direction, not zero")
+        # Scaling once more would change the last digit of what is already of unit length.
+        unit = normal / length if abs(length - 1.0) > 1e-12 else normal
+        offset = finite_number(f"{self.name}.offset", self.offset)
+        self._store(normal=tuple(unit.tolist()), offset=offset)
+
+    def convex_shapes(self) -> tuple[coal.CollisionGeometry, ...]:
+        """Return coal's half-space."""
+        return (coal.Halfspace(np.array(self.normal), self.offset),)
+
+
+def obstacle_pose(obstacle: Obstacle) -> pin.SE3:
+    """Return the pose of an obstacle's frame."""
+    return pin.XYZQUATToSE3(np.array([*obstacle.position, *obstacle.orientation_xyzw]))
+
+
+def geometry_objects(
+    obstacle: Obstacle, joint: int = 0, frame: int = 0, placement: pin.SE3 | None = None
+) -> list[pin.GeometryObject]:
+    """Return an obstacle's convex shapes as Pinocchio's geometry objects.
+
+    A frame holds them, by its index and its placement against a joint; none if in the world.
+    """
+    shapes = obstacle.convex_shapes()
+    pose = obstacle_pose(obstacle) if placement is None else placement * obstacle_pose(obstacle)
+    return [
+        pin.GeometryObject(name, joint, frame, pose, shape)
+        for name, shape in zip(numbered(obstacle.name, len(shapes)), shapes, strict=True)
+    ]
+
+
+def numbered(name: str, count: int) -> list[str]:
+    """Return names for the shapes of one body: its own for one, else with a dot and a number."""
+    return [name] if count == 1 else [f"{name}.{k}" for k in range(count)]

@@ -1,0 +1,174 @@
+"""Scene: the obstacles around an arm, in the world frame, and the bodies that it holds."""
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import MISSING, asdict, dataclass, fields
+from pathlib import Path
+from typing import Any
+
+from densarm.errors import InvalidValueError, UnknownNameError
+from densarm.scene.mesh import Mesh
+from densarm.scene.obstacles import Box, Capsule, Cylinder, HalfSpace, Obstacle, Sphere
+from densarm.values.checks import non_negative
+from densarm.values.documented import documented
+
+OBSTACLE_TYPES: Mapping[str, type[Obstacle]] = {
+    "sphere": Sphere,
+    "box": Box,
+    "capsule": Capsule,
+    "cylinder": Cylinder,
+    "half_space": HalfSpace,
+    "mesh": Mesh,
+}
+"""Every kind of obstacle by the word that files use for it."""
+
+
+@documented
+@dataclass(frozen=True)
+class Attachment:
+    """A body fixed to a link: an obstacle whose pose is in the frame of that link.
+
+    It keeps clear of all obstacles and of every link, even a neighbouring one, that moves against
+    its own and is not listed in `touch_links`.
+
+    Raises:
+        InvalidValueError: the body is none or has no end, a link without a name, or a mass that
+            is not a finite number >= 0.
+    """
+
+    body: Obstacle
+    """The body, its pose in the frame of the link."""
+    link: str
+    """Link, or other frame of the URDF, that holds it."""
+    touch_links: Sequence[str] = ()
+    """Links that it may touch and even enter, besides its own."""
+    mass: float = 0.0
+    """Mass, spread evenly over its volume [kg]; 0 leaves it out of the dynamics."""
+
+    def __post_init__(self) -> None:
+        kinds = [kind for kind in OBSTACLE_TYPES.values() if kind is not HalfSpace]
+        _require_kind("attached body", self.body, kinds)
+        name, links = self.body.name, self.touch_links
+        if not isinstance(links, tuple | list) or not all(isinstance(x, str) for x in links):
+            raise InvalidValueError(f"{name}.touch_links", links, "a list of names of links")
+        if not isinstance(self.link, str):
+            raise InvalidValueError(f"{name}.attached_to", self.link, "the name of a link")
+        object.__setattr__(self, "touch_links", tuple(links))
+        object.__setattr__(self, "mass", non_negative(f"{name}.mass", self.mass))
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the attachment as JSON data; `from_json` is its inverse."""
+        holding = {"attached_to": self.link, "touch_links": self.touch_links, "mass": self.mass}
+        return {**obstacle_table(self.body), **holding}
+
+    @classmethod
+    def from_json(cls, table: Mapping[str, Any], folder: Path | None = None) -> "Attachment":
+        """Build an attachment from what `parse_obstacle` takes, and ``attached_to``.
+
+        The table may have ``touch_links`` and ``mass`` too.
+        """
+        values = dict(table)
+        link = values.pop("attached_to", None)
+        touch_links, mass = values.pop("touch_links", ()), values.pop("mass", 0.0)
+        return cls(parse_obstacle(values, folder), link, touch_links, mass)
+
+
+@documented
+@dataclass(frozen=True)
+class Scene:
+    """Obstacles with distinct names, and bodies that are attached to links.
+
+    Attached bodies move with the arm and are a part of it: `Arm.holding` takes them.
+
+    Raises:
+        InvalidValueError: two bodies share a name, or an entry is not an obstacle.
+    """
+
+    obstacles: tuple[Obstacle, ...] = ()
+    """What stands still."""
+    attachments: tuple[Attachment, ...] = ()
+    """What links hold."""
+
+    def __init__(
+        self, obstacles: Iterable[Obstacle] = (), attachments: Iterable[Attachment] = ()
+    ) -> None:
+        object.__setattr__(self, "obstacles", tuple(obstacles))
+        object.__setattr__(self, "attachments", tuple(attachments))
+        for obstacle in self.obstacles:
+            _require_kind("obstacle", obstacle, OBSTACLE_TYPES.values())
+        names: set[str] = set()
+        for body in (*self.obstacles, *(item.body for item in self.attachments)):
+            if body.name in names:
+                raise InvalidValueError("obstacle name", body.name, "used only once in a scene")
+            names.add(body.name)
+
+    def __len__(self) -> int:
+        return len(self.obstacles)
+
+    def __iter__(self) -> Iterator[Obstacle]:
+        return iter(self.obstacles)
+
+    def to_json(self) -> list[dict[str, Any]]:
+        """Return obstacles and attachments as JSON data; `from_json` is its inverse."""
+        attached = [item.to_json() for item in self.attachments]
+        return [*(obstacle_table(item) for item in self), *attached]
+
+    @classmethod
+    def from_json(cls, data: Iterable[Mapping[str, Any]], folder: Path | None = None) -> "Scene":
+        """Build a scene from one mapping per obstacle: its type and its fields.
+
+        Those with the key ``attached_to`` become attachments.
+
+        Args:
+            data: the mappings.
+            folder: where relative paths of meshes start from; None for the working directory.
+
+        Raises:
+            DensarmError: as `parse_obstacle`, with the field.
+        """
+        obstacles, attachments = [], []
+        for table in data:
+            if not isinstance(table, Mapping):
+                raise InvalidValueError("obstacle", table, "a table with the key 'type'")
+            if "attached_to" in table:
+                attachments.append(Attachment.from_json(table, folder))
+            else:
+                obstacles.append(parse_obstacle(table, folder))
+        return cls(obstacles, attachments)
+
+
+def obstacle_table(obstacle: Obstacle) -> dict[str, Any]:
+    """Return an obstacle as plain data; `parse_obstacle` is its inverse."""
+    words = {kind: word for word, kind in OBSTACLE_TYPES.items()}
+    return {"type": words[type(obstacle)], **asdict(obstacle)}
+
+
+def parse_obstacle(table: Mapping[str, Any], folder: Path | None = None) -> Obstacle:
+    """Return the obstacle that a table of TOML or JSON describes, by its type and its fields.
+
+    Raises:
+        UnknownNameError: an unknown type, or a field that the type does not have.
+        InvalidValueError: a missing field, or a value that is not allowed.
+        FileContentError: a mesh file, its path relative to the folder, that cannot be used.
+    """
+    values = dict(table)
+    word = values.pop("type", None)
+    name = f"obstacle {values.get('name', '?')}"
+    if not isinstance(word, str) or word not in OBSTACLE_TYPES:
+        raise UnknownNameError(f"type of {name}", word, OBSTACLE_TYPES)
+    kind = OBSTACLE_TYPES[word]
+    known = {item.name: item.default is MISSING for item in fields(kind)}
+    for key in values:
+        if key not in known:
+            raise UnknownNameError(f"key of {name} ({word})", key, known)
+    for key, required in known.items():
+        if required and key not in values:
+            raise InvalidValueError(f"{name}.{key}", None, f"given for a {word}")
+    if folder is not None and values.get("path"):
+        values["path"] = str(folder / str(values["path"]))
+    return kind(**values)
+
+
+def _require_kind(name: str, body: object, kinds: Iterable[type[Obstacle]]) -> None:
+    if not isinstance(body, tuple(kinds)):
+        names = ", ".join(kind.__name__ for kind in kinds)
+        raise InvalidValueError(name, body, f"one of {names}")

@@ -1,0 +1,204 @@
+"""Run: the record of a run, its summary, its file, and its certificate."""
+
+import json
+import zlib
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+from zipfile import BadZipFile, ZipFile, is_zipfile
+
+import numpy as np
+
+from densarm.certificates.certificate import Certificate, certify
+from densarm.certificates.task import Task
+from densarm.errors import DensarmError, FileContentError
+from densarm.values.arrays import Array
+from densarm.values.documented import documented
+from densarm.values.files import atomic_file
+from densarm.values.outcome import Outcome
+from densarm.world.world import World
+
+_MAX_BYTES = 4_000_000_000  # unpacked; the longest run of a seven-joint arm has half of it
+_UNIT_TOLERANCE = 1e-6
+_FAULTS = (ValueError, OverflowError, KeyError, TypeError, AttributeError, EOFError)
+_DAMAGE = (BadZipFile, zlib.error, NotImplementedError)  # what reading a damaged archive raises
+_ARRAYS = ("time", "q", "v", "tau", "clearance")
+
+
+@documented
+@dataclass(frozen=True, eq=False)
+class Run:
+    """Every state of a run, first and last included, and how it ended."""
+
+    task: Task
+    """What it was about."""
+    time: Array
+    """k dt (N,) [s]."""
+    q: Array
+    """Configurations (N, nq)."""
+    v: Array
+    """Velocities (N, nv) [rad/s or m/s]."""
+    tau: Array
+    """Torque held from each sample to the next (N, nv) [N·m or N]; the last row repeats. Zero where
+    the plant is told velocities."""
+    clearance: Array
+    """Smallest signed distance over all pairs (N,) [m]; infinite without pairs."""
+    outcome: Outcome
+    """How it ended."""
+    detail: str = ""
+    """What stood in the way, in a phrase; empty when reached."""
+    plan_time: float = 0.0
+    """Wall-clock time that the guide took [s]; zero for the direct guide."""
+    preparation_time: float = 0.0
+    """Wall-clock time from the scenario to the first torque [s], planning included, and compiling
+    where kernels are not on disk yet; zero where nothing moved."""
+    tracking_error: float | None = None
+    """Largest joint error against the controller's reference [rad or m]; None without one."""
+    replanned_at: tuple[float, ...] = ()
+    """Times at which the arm had lost its plan, and there was a new one from where it was [s]."""
+
+    @classmethod
+    def at_rest(cls, task: Task, world: World, outcome: Outcome, detail: str) -> "Run":
+        """Return the run of an arm that did not move.
+
+        Args:
+            task: what was not done.
+            world: its arm and scene.
+            outcome: why not.
+            detail: the same in a phrase.
+        """
+        rest = np.zeros((1, task.arm.nv))
+        smallest = world.distances(task.start).min(initial=np.inf)
+        return cls(
+            task=task,
+            time=np.zeros(1),
+            q=task.start[np.newaxis],
+            v=rest,
+            tau=rest.copy(),
+            clearance=np.array([smallest]),
+            outcome=outcome,
+            detail=detail,
+        )
+
+    @cached_property
+    def certificate(self) -> Certificate:
+        """What is proved about the run, computed anew from the record when first asked for."""
+        return certify(self.task, self.time, self.q, self.v, self.tau)
+
+    @property
+    def certified(self) -> bool:
+        """Whether the certificate holds in every part."""
+        return self.certificate.certified
+
+    @property
+    def goal_error(self) -> float:
+        """Largest joint error at the end [rad or m]; NaN without a goal."""
+        return self.task.goal_error(self.q[-1])
+
+    @property
+    def peak_torque_ratio(self) -> float:
+        """Largest torque in units of its limit; joints without a limit do not count."""
+        return float((np.abs(self.tau) / self.task.arm.limits.effort).max())
+
+    def summary(self) -> dict[str, Any]:
+        """Return the run's figures as JSON data; None for what is unknown or infinite."""
+        smallest, error = float(self.clearance.min()), self.goal_error
+        return {
+            "outcome": str(self.outcome),
+            "duration_s": float(self.time[-1]),
+            "min_clearance_m": smallest if np.isfinite(smallest) else None,
+            "goal_error_rad": error if np.isfinite(error) else None,
+            "peak_torque_ratio": self.peak_torque_ratio,
+            "plan_time_s": self.plan_time,
+            "preparation_time_s": self.preparation_time,
+            "certified": self.certified,
+        }
+
+    def save(self, path: str | Path) -> None:
+        """Write the run to a .npz file, whole or not at all.
+
+        Args:
+            path: the file; its folder must exist.
+
+        Raises:
+            FileContentError: the file cannot be written.
+        """
+        result = {
+            "outcome": str(self.outcome),
+            "detail": self.detail,
+            "plan_time_s": self.plan_time,
+            "preparation_time_s": self.preparation_time,
+            "tracking_error_rad": self.tracking_error,
+            "replanned_at_s": list(self.replanned_at),
+        }
+        with atomic_file(Path(path)) as file:
+            np.savez_compressed(
+                file,
+                **{name: getattr(self, name) for name in _ARRAYS},
+                scenario=np.array(json.dumps(self.task.to_json())),
+                result=np.array(json.dumps(result)),
+            )
+
+    @classmethod
+    def load(cls, path: str | Path) -> "Run":
+        """Read a run that `save` wrote.
+
+        Raises:
+            FileContentError: no such file, or it is not a run, or its arm cannot be rebuilt, e.g.
+                since a mesh has changed.
+        """
+        try:
+            _check_archive(path)
+            with Path(path).open("rb") as file, np.load(file, allow_pickle=False) as data:
+                arrays = {name: data[name] for name in _ARRAYS}
+                task = json.loads(str(data["scenario"]))
+                result = json.loads(str(data["result"]))
+            deviation = result["tracking_error_rad"]
+            return cls(
+                task=Task.from_json(task),
+                **arrays,
+                outcome=Outcome(result["outcome"]),
+                detail=str(result["detail"]),
+                plan_time=float(result["plan_time_s"]),
+                preparation_time=float(result["preparation_time_s"]),
+                tracking_error=None if deviation is None else float(deviation),
+                replanned_at=tuple(float(time) for time in result.get("replanned_at_s", ())),
+            )._checked()
+        except OSError as error:
+            raise FileContentError(path, error.strerror or "cannot be read") from None
+        except FileContentError:
+            raise
+        except DensarmError as error:
+            raise FileContentError(path, f"not a run: {error}") from None
+        except (MemoryError, RecursionError):
+            raise FileContentError(path, "not a run: too large, or nested too deeply") from None
+        except (*_FAULTS, *_DAMAGE) as error:
+            raise FileContentError(path, f"not a run: {' '.join(str(error).split())}") from None
+
+    def _checked(self) -> "Run":
+        n, arm = len(self.time), self.task.arm
+        shapes = {"time": (n,), "q": (n, arm.nq), "v": (n, arm.nv), "tau": (n, arm.nv)}
+        for name, shape in {**shapes, "clearance": (n,)}.items():
+            array = getattr(self, name)
+            if array.dtype != np.float64:
+                raise DensarmError(f"{name} holds {array.dtype}, not float64")
+            if array.shape != shape or n == 0:
+                raise DensarmError(f"{name} has shape {array.shape}, expected {shape}")
+            if np.isnan(array).any() or (name != "clearance" and np.isinf(array).any()):
+                raise DensarmError(f"{name} has entries that are not finite")
+        if np.abs(arm.configurations(arm.angles(self.q)) - self.q).max() > _UNIT_TOLERANCE:
+            raise DensarmError("q has a (cos, sin) pair that is not of length one")
+        return self
+
+
+def _check_archive(path: str | Path) -> None:
+    """Refuse a file that is no .npz, or one that is small packed and huge unpacked."""
+    if not Path(path).is_file():
+        return  # opening it says why
+    if not is_zipfile(path):
+        raise FileContentError(path, "not a run: not a .npz file")
+    with ZipFile(path) as archive:
+        size = sum(member.file_size for member in archive.infolist())
+    if size > _MAX_BYTES:
+        raise FileContentError(path, f"not a run: larger than {_MAX_BYTES / 1e9:g} GB")

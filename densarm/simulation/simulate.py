@@ -1,0 +1,200 @@
+"""The fixed-step loop: any controller around any plant, judged and recorded."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from densarm.certificates.task import (
+    REACHED_POSITION,
+    REACHED_VELOCITY,
+    Input,
+    SimulationParameters,
+    Task,
+)
+from densarm.control.controller import Controller, VelocityController
+from densarm.errors import InvalidValueError
+from densarm.simulation.plants import PinocchioPlant, Plant
+from densarm.simulation.run import Run
+from densarm.values.arrays import Array
+from densarm.values.checks import finite_vector, one_of
+from densarm.values.outcome import Outcome
+from densarm.world.configurations import infeasibility
+from densarm.world.swept_check import SweptCheck
+from densarm.world.world import World
+
+OnProgress = Callable[[str], None]
+"""Told in a phrase what is being done."""
+
+_HELD_SHARE = 0.5  # the loop ends well inside the bounds on position and velocity at the goal
+_STALL_MOTION = 0.01  # [rad or m] within the stall time
+_PROGRESS_INTERVAL = 200  # steps
+_NEAREST = 3  # pairs named where an arm rests
+
+
+def simulate(
+    world: World,
+    controller: Controller | VelocityController,
+    start: ArrayLike,
+    goal: ArrayLike | None = None,
+    *,
+    plant: Plant | None = None,
+    parameters: SimulationParameters = SimulationParameters(),
+    title: str = "run",
+    on_progress: OnProgress = lambda _: None,
+) -> Run:
+    """Run a controller in a closed loop from rest, until it ends.
+
+    It ends where the arm has held the goal, where it touches something, where it rests away from
+    the goal for too long, or when the time is up. A goal is taken to be the controller's own
+    attribute `goal`; without any the run ends by contact or time.
+
+    Args:
+        world: the arm among obstacles, as they are now.
+        controller: called at each control period, with the time since the run began. Its
+            attributes `goal`, `motion`, `tracking_error` and `describe_stall`, where it has them,
+            tell what it wants, how long it moves, and why it rests.
+        start: configuration (nq,).
+        goal: configuration (nq,); None for the controller's own.
+        plant: what is driven; None for the arm's model.
+        parameters: time step and limits of time.
+        title: of the record.
+        on_progress: told what is being done.
+
+    Returns:
+        The recorded run. Whatever happened is its `outcome`, not an exception.
+
+    Raises:
+        InvalidValueError: start or goal is not a configuration, a plant of another time step or an
+            unknown input, a controller without the method for it, or a torque that is not one.
+    """
+    driven = plant or PinocchioPlant(world.arm, parameters.dt, parameters.integrator)
+    wanted = getattr(controller, "goal", None) if goal is None else goal
+    told = getattr(driven, "input", Input.TORQUE)
+    task = Task(
+        arm=world.arm,
+        scene=world.scene,
+        start=world.arm.check_configuration("start", start),
+        goal=None if wanted is None else world.arm.check_configuration("goal", wanted),
+        title=title,
+        simulation=parameters,
+        input=Input(one_of("input of the plant", told, list(Input))),
+    )
+    return simulate_task(task, world, controller, driven, on_progress)
+
+
+def simulate_task(
+    task: Task,
+    world: World,
+    controller: Controller | VelocityController,
+    plant: Plant | None = None,
+    on_progress: OnProgress = lambda _: None,
+) -> Run:
+    """Run a controller on a task; as `simulate`, which makes the task."""
+    parameters = task.simulation
+    driven = plant or PinocchioPlant(world.arm, parameters.dt, parameters.integrator)
+    if driven.dt != parameters.dt:
+        raise InvalidValueError("dt of the plant", driven.dt, f"the loop's, {parameters.dt}")
+    if not callable(getattr(controller, task.input, None)):
+        allowed = f"one with a method {task.input}(t, q, v), which this plant needs"
+        raise InvalidValueError("controller", type(controller).__name__, allowed)
+    if fault := infeasibility(SweptCheck(world, task.margin), {"start": task.start}):
+        return Run.at_rest(task, world, Outcome.INFEASIBLE, fault)
+    return _Loop(task, world, controller, driven).run(on_progress)
+
+
+@dataclass(eq=False)
+class _Loop:
+    """One run in the making."""
+
+    task: Task
+    world: World
+    controller: Controller | VelocityController
+    plant: Plant
+    q: list[Array] = field(default_factory=list)
+    v: list[Array] = field(default_factory=list)
+    clearance: list[float] = field(default_factory=list)
+
+    def run(self, on_progress: OnProgress) -> Run:
+        task, p = self.task, self.task.simulation
+        q, v, inputs = task.start, np.zeros(task.arm.nv), []
+        held, rest, rested_since = 0, q, 0
+        motion = getattr(self.controller, "motion", None)
+        moves_until = 0.0 if motion is None else motion.duration
+        tracking_error: float | None = None
+        outcome, detail = Outcome.TIMED_OUT, f"after {p.time_limit:.3g} s"
+        self._record(q, v)
+        for k in range(round(p.time_limit / p.dt)):
+            if k % p.control_divisor == 0:
+                u = self._input(k * p.dt, q, v)
+                error = getattr(self.controller, "tracking_error", None)
+                if error is not None:
+                    tracking_error = max(float(error), tracking_error or 0.0)
+            q, v = self.plant.step(q, v, u)
+            inputs.append(u)
+            if touching := self._record(q, v):
+                outcome, detail = Outcome.COLLIDED, f"{touching} at t = {(k + 1) * p.dt:.3f} s"
+                break
+            held = held + 1 if self._is_at_goal(q, v) else 0
+            if k * p.dt <= moves_until or self._distance(q, rest) > _STALL_MOTION:
+                rest, rested_since = q, k
+            if held * p.dt >= p.hold_time:
+                outcome, detail = Outcome.REACHED, ""
+                break
+            if task.goal is not None and (k - rested_since) * p.dt >= p.stall_time:
+                outcome, detail = Outcome.STUCK, self._describe_rest(q)
+                break
+            if k % _PROGRESS_INTERVAL == 0:
+                on_progress(f"running, {k * p.dt:.1f} s simulated")
+        tau = np.array([*inputs, inputs[-1]])
+        return Run(
+            task=task,
+            time=p.dt * np.arange(len(self.q), dtype=np.float64),
+            q=np.array(self.q),
+            v=np.array(self.v),
+            tau=tau if task.input == Input.TORQUE else np.zeros_like(tau),
+            clearance=np.array(self.clearance),
+            outcome=outcome,
+            detail=detail,
+            tracking_error=tracking_error,
+            replanned_at=tuple(getattr(self.controller, "replanned_at", ())),
+        )
+
+    def _input(self, t: float, q: Array, v: Array) -> Array:
+        u = getattr(self.controller, self.task.input)(t, q, v)
+        if not (isinstance(u, np.ndarray) and u.shape == v.shape and np.isfinite(u).all()):
+            u = finite_vector(f"{self.task.input} of the controller at t = {t:.3f} s", u, len(v))
+        return np.array(u, np.float64)  # a controller may write the next one into the same array
+
+    def _record(self, q: Array, v: Array) -> str:
+        """Keep a state; return what touches there, as a phrase."""
+        distance = self.world.distances(q)
+        self.q.append(q.copy())  # as may a plant
+        self.v.append(v.copy())
+        self.clearance.append(float(distance.min(initial=np.inf)))
+        if self.clearance[-1] <= 0.0:
+            return " and ".join(self.world.pairs[int(distance.argmin())])
+        return ""
+
+    def _is_at_goal(self, q: Array, v: Array) -> bool:
+        if self.task.goal is None or np.abs(v).max() > _HELD_SHARE * REACHED_VELOCITY:
+            return False
+        return self._distance(self.task.goal, q) <= _HELD_SHARE * REACHED_POSITION
+
+    def _distance(self, q_a: Array, q_b: Array) -> float:
+        """Return the largest difference of a joint [rad or m]."""
+        return float(np.abs(self.task.arm.difference(q_a, q_b)).max())
+
+    def _describe_rest(self, q: Array) -> str:
+        """Return why the arm rests at q (nq,) in the controller's words, or what is near there."""
+        own = getattr(self.controller, "describe_stall", None)
+        if own is not None and (told := str(own(q))):
+            return told
+        where = ", ".join(f"{angle:.4g}" for angle in self.task.arm.angles(q))
+        distance = self.world.distances(q)
+        nearest = ", ".join(
+            f"{' and '.join(self.world.pairs[k])} ({1e3 * distance[k]:.3g} mm)"
+            for k in np.argsort(distance)[:_NEAREST]
+        )
+        return f"at rest at joint positions ({where}); nearest there: {nearest or 'no pair'}"

@@ -1,0 +1,337 @@
+"""Problems: from a start to a goal in a scene, one by one or in processes, and their results."""
+
+import signal
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass, replace
+from functools import lru_cache, partial
+from multiprocessing import get_context
+from pathlib import Path
+from typing import Any, TypeVar
+
+import numpy as np
+
+from densarm.arms.arm import Arm, load_arm
+from densarm.certificates.task import REACHED_POSITION, REACHED_VELOCITY
+from densarm.errors import FileContentError, InvalidValueError
+from densarm.planning.motion import PlanningError, TimingParameters
+from densarm.scenarios.run import run as run_scenario
+from densarm.scenarios.scenario import ControlParameters, Scenario
+from densarm.scene.loading import MotionProblem
+from densarm.simulation.run import Run
+from densarm.values.checks import positive_integer
+from densarm.values.outcome import FAILED, RUN_ENDS, Outcome
+
+PERCENTILES = (50, 95, 98)
+
+MEASURES = (
+    "plan_time_s",
+    "preparation_time_s",
+    "duration_s",
+    "motion_s",
+    "optimal_ratio",
+    "path_length_rad",
+)
+"""What percentiles are taken of, as `ProblemResult` calls it."""
+
+_ALL = TimingParameters(velocity_share=1.0, acceleration_share=1.0, torque_share=1.0)
+_SPACING = 0.02  # of the points that a path is interpolated through [rad or m]
+_DEGREE = 3
+
+Item = TypeVar("Item")
+Result = TypeVar("Result")
+
+
+@dataclass(frozen=True)
+class ProblemResult:
+    """How one problem's run ended."""
+
+    scene: str
+    """The set that the problem belongs to."""
+    index: int
+    """Its place in the set."""
+    outcome: str
+    """One of `RUN_ENDS`."""
+    detail: str = ""
+    """What stood in the way, as a phrase."""
+    duration_s: float | None = None
+    """Simulated time [s]; None where nothing ran, as in what follows."""
+    min_clearance_m: float | None = None
+    """Smallest signed distance [m]; None without pairs."""
+    goal_error_rad: float | None = None
+    """Largest joint error at the end [rad or m]."""
+    peak_torque_ratio: float | None = None
+    """Largest torque in units of its limit."""
+    plan_time_s: float | None = None
+    """Wall-clock time that the guide took [s]."""
+    preparation_time_s: float | None = None
+    """Wall-clock time from the scenario to the first torque [s], where the record tells it."""
+    motion_s: float | None = None
+    """Simulated time from which on the arm was at the goal and at rest [s]."""
+    optimal_s: float | None = None
+    """Shortest time along the same path under the same limits [s], where that was asked for."""
+    path_length_rad: float | None = None
+    """Length of the way in joint space [rad or m]."""
+    certified: bool = False
+    """Whether the certificate holds in every part."""
+
+    @property
+    def optimal_ratio(self) -> float | None:
+        """Time of the motion in units of the shortest along the same path."""
+        if self.motion_s is None or self.optimal_s is None:
+            return None
+        return self.motion_s / self.optimal_s
+
+
+@dataclass(frozen=True)
+class ProblemResults:
+    """How the runs of a set of problems ended."""
+
+    results: tuple[ProblemResult, ...]
+
+    @property
+    def total(self) -> int:
+        """Number of problems."""
+        return len(self.results)
+
+    @property
+    def certified(self) -> int:
+        """Number of runs that reached the goal and whose certificate holds in every part."""
+        return sum(r.outcome == Outcome.REACHED and r.certified for r in self.results)
+
+    @property
+    def min_clearance(self) -> float | None:
+        """Smallest signed distance of all runs [m]; None without pairs."""
+        found = [r.min_clearance_m for r in self.results if r.min_clearance_m is not None]
+        return min(found, default=None)
+
+    @property
+    def sets(self) -> tuple[str, ...]:
+        """Names of the sets that the problems belong to."""
+        return tuple(dict.fromkeys(result.scene for result in self.results))
+
+    def of(self, scene: str | None) -> "ProblemResults":
+        """Return the results of one set of problems; of all without a name."""
+        return ProblemResults(tuple(r for r in self.results if scene in (None, r.scene)))
+
+    def count(self, outcome: str) -> int:
+        """Return the number of runs that ended so."""
+        return sum(r.outcome == outcome for r in self.results)
+
+    def percentiles(self, measure: str) -> list[float] | None:
+        """Return the `PERCENTILES` of one of `MEASURES` over the runs that reached, where known."""
+        reached = [getattr(r, measure) for r in self.results if r.outcome == Outcome.REACHED]
+        known = [value for value in reached if value is not None]
+        return np.percentile(known, PERCENTILES).tolist() if known else None
+
+    def to_json(self) -> dict[str, Any]:
+        """Return JSON data: every problem, the figures of all, and those of each set."""
+        return {
+            "problems": [vars(result) for result in self.results],
+            **self.figures(),
+            "sets": {name: self.of(name).figures() for name in self.sets},
+        }
+
+    def figures(self) -> dict[str, Any]:
+        """Return counts, and the `PERCENTILES` of each measure, as JSON data."""
+        return {
+            "reached": self.count(Outcome.REACHED),
+            "certified": self.certified,
+            "total": self.total,
+            "outcomes": {outcome: self.count(outcome) for outcome in RUN_ENDS},
+            **{measure: self.percentiles(measure) for measure in MEASURES},
+            "min_clearance_m": self.min_clearance,
+        }
+
+
+def run_problems(
+    problems: Sequence[MotionProblem],
+    jobs: int = 1,
+    on_progress: Callable[[str], None] = lambda _: None,
+    **options: Any,
+) -> ProblemResults:
+    """Plan each problem, run its torque-driven closed loop and prove it.
+
+    Args:
+        problems: what to run.
+        jobs: processes to run them in; 1 for this one.
+        on_progress: told what is being done.
+        options: those of `run_problem`.
+
+    Returns:
+        How each run ended, in the order of the problems, whatever the number of processes. A run
+        that raises an error counts as failed and stops no other.
+
+    Raises:
+        UnknownNameError: a problem of no known robot, or of a joint to lock that it does not have.
+        InvalidValueError: a problem that does not give each joint of the robot one position, or a
+            number of processes below one.
+    """
+    for problem in problems:
+        scenario_of(problem)
+    results = []
+    for result in in_processes(partial(run_problem, **options), problems, jobs):
+        results.append(result)
+        on_progress(f"{len(results)} of {len(problems)} problems run")
+    return ProblemResults(tuple(results))
+
+
+def run_problem(
+    problem: MotionProblem,
+    seed: int = 0,
+    guide: str = "path",
+    save_dir: Path | None = None,
+    time_optimal: bool = False,
+) -> ProblemResult:
+    """Plan a problem, run its closed loop and prove it; an error becomes a result.
+
+    Args:
+        problem: of a known robot.
+        seed: of the planner.
+        guide: what supplies the sub-goals: "path" or "direct".
+        save_dir: folder of the recorded runs, SCENE_INDEX.npz; a problem whose record is there
+            already is not run again. None to keep none.
+        time_optimal: whether to compute the shortest time along the run's path.
+    """
+
+    def run() -> Run:
+        scenario = replace(scenario_of(problem, seed), control=ControlParameters(guide=guide))
+        if save_dir is None:
+            return run_scenario(scenario)
+        file = save_dir / f"{problem.scene_name}_{problem.index}.npz"
+        if not file.is_file():
+            done = run_scenario(scenario)
+            done.save(file)
+            return done
+        recorded = Run.load(file)
+        if recorded.task.to_json() != scenario.task.to_json():
+            raise FileContentError(file, "the record of another problem: remove it, or its folder")
+        return recorded
+
+    return problem_result(problem.scene_name, problem.index, run, time_optimal)
+
+
+def problem_result(
+    scene: str, index: int, run: Callable[[], Run], time_optimal: bool = False
+) -> ProblemResult:
+    """Return how a run ends, given by a function that runs it; an error becomes a result."""
+    try:
+        done = run()
+        reached = done.outcome == Outcome.REACHED
+        return ProblemResult(
+            scene=scene,
+            index=index,
+            detail=done.detail,
+            motion_s=motion_time(done) if reached else None,
+            optimal_s=shortest_time(done) if reached and time_optimal else None,
+            path_length_rad=path_length(done),
+            **done.summary(),
+        )
+    except (ValueError, ArithmeticError, RuntimeError) as error:
+        return ProblemResult(scene, index, FAILED, str(error))
+
+
+def scenario_of(problem: MotionProblem, seed: int = 0) -> Scenario:
+    """Return a problem of a known robot as a scenario with default parameters.
+
+    Raises:
+        UnknownNameError: no such robot, or joint to lock.
+        InvalidValueError: it does not give each joint of the robot one position.
+    """
+    arm = named_arm(problem.robot, tuple(sorted(problem.locked_joints.items())))
+    if sorted(problem.joints) != sorted(arm.joint_names):
+        allowed = f"the joints of {problem.robot}, {', '.join(arm.joint_names)}"
+        raise InvalidValueError("metadata.joints", list(problem.joints), allowed)
+    order = [problem.joints.index(name) for name in arm.joint_names]
+    name = f"{problem.robot}_{problem.scene_name}_{problem.index}"
+    return Scenario(
+        name=name,
+        title=name,
+        arm=arm,
+        scene=problem.scene,
+        start=arm.configuration([problem.start[k] for k in order]),
+        goal=arm.configuration([problem.goal[k] for k in order]),
+        seed=seed,
+    )
+
+
+@lru_cache(maxsize=1)
+def named_arm(name: str, locked_joints: tuple[tuple[str, float], ...] = ()) -> Arm:
+    """Return an arm as `load_arm` does, the same one when it is asked for again."""
+    return load_arm(name, locked_joints=dict(locked_joints))
+
+
+def in_processes(
+    work: Callable[[Item], Result], items: Sequence[Item], jobs: int
+) -> Iterator[Result]:
+    """Do the same work on many items, and yield the results in the order of the items.
+
+    Args:
+        work: what to do; with its items and results it can be pickled.
+        items: what to do it on.
+        jobs: processes; 1 for this one.
+
+    Raises:
+        InvalidValueError: a number of processes below one.
+    """
+    if positive_integer("jobs", jobs) == 1:
+        yield from map(work, items)
+        return
+    # Ctrl-C reaches the whole group of processes: it ends these at once, and only this one tells.
+    pool = ProcessPoolExecutor(
+        jobs, get_context("spawn"), signal.signal, (signal.SIGINT, signal.SIG_DFL)
+    )
+    try:
+        yield from pool.map(work, items)
+    finally:
+        pool.shutdown(cancel_futures=True)
+
+
+def path_length(run: Run) -> float:
+    """Return the length of a run's way in joint space [rad or m]."""
+    steps = run.task.arm.difference(run.q[:-1], run.q[1:])
+    return float(np.linalg.norm(steps, axis=1).sum())
+
+
+def motion_time(run: Run) -> float:
+    """Return the time from which on the arm is at the goal and at rest [s]; infinite if never."""
+    if run.task.goal is None:
+        return np.inf
+    error = np.abs(run.task.arm.difference(run.q, run.task.goal)).max(axis=1)
+    away = (error > REACHED_POSITION) | (np.abs(run.v).max(axis=1) > REACHED_VELOCITY)
+    k = int(np.flatnonzero(away).max(initial=-1)) + 1
+    return float(run.time[k]) if k < len(run.time) else np.inf
+
+
+def shortest_time(run: Run) -> float | None:
+    """Return the shortest time along the path of a run, from rest to rest [s].
+
+    All of the velocity, acceleration and torque limits may be used, with no regard to stopping.
+    The path is a cubic spline through points of the run, and TOPP-RA times it. None for an arm that
+    did not move, or of limits that allow no motion.
+
+    Source: Pham and Pham, A New Approach to Time-Optimal Path Parameterization Based on
+        Reachability Analysis, IEEE T-RO 2018.
+    """
+    # SciPy and TOPP-RA take a second to import.
+    from scipy.interpolate import make_interp_spline
+
+    from densarm.planning.smoothing import SmoothPath
+    from densarm.planning.timing import time_path
+
+    arm = run.task.arm
+    steps = arm.difference(run.q[:-1], run.q[1:])
+    arc = np.append(0.0, np.cumsum(np.linalg.norm(steps, axis=1)))
+    length = float(arc[-1])
+    if length < _SPACING:
+        return None
+    angles = arm.angles(run.q[0]) + np.vstack([np.zeros(arm.nv), np.cumsum(steps, axis=0)])
+    at = np.linspace(0.0, length, max(_DEGREE, round(length / _SPACING)) + 1)
+    points = np.column_stack([np.interp(at, arc, column) for column in angles.T])
+    spline = make_interp_spline(at / length, points, k=_DEGREE)
+    path = SmoothPath(spline.t, spline.c)
+    try:
+        period = run.task.simulation.control_period
+        return time_path(arm, path, length, period, _ALL).duration
+    except PlanningError:
+        return None

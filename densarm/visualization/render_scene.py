@@ -1,0 +1,198 @@
+"""RenderScene: all there is to see of a run, before anything draws it."""
+
+from dataclasses import dataclass
+from itertools import pairwise, product
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from densarm.simulation.run import Run
+from densarm.values.arrays import Array
+from densarm.values.outcome import Outcome
+from densarm.visualization.bodies import arm_bodies, obstacle_bodies
+from densarm.visualization.camera import Camera
+from densarm.visualization.palette import ClearanceScale
+from densarm.visualization.triangle_mesh import TriangleMesh, sphere_swept_hull, tube
+from densarm.world.world import NearestPair, World
+
+_FRAMES_PER_SECOND = 60.0
+_FLOOR_CELL = 0.25  # [m]
+_PATH_RADIUS = 0.006  # of the drawn end-effector path, as a part of the arm's extent
+_CLOSEST_RADIUS = 0.5  # of the closest pair's line, as a part of the path's
+_SHORTEST = 1e-6  # length of that line [m], so that it has a direction
+_END = 2.0  # radius of its ends over half its width
+_SURROUNDINGS = 0.75  # seen around the motion where obstacles stand, as a part of its extent
+_VIEWED_SAMPLES = 60  # configurations of a motion that the camera is placed for
+_WATCHED_SAMPLES = 16  # of them, those whose end effector is to be seen
+
+
+@dataclass(frozen=True)
+class SummaryLine:
+    """What to say of a run, in a few words."""
+
+    title: str
+    words: tuple[tuple[str, bool | None], ...]
+    """Outcome, duration, smallest clearance and certificate: each good, bad or neither."""
+    detail: str
+    """What the outcome means, and what stood in the way; nothing where it reached."""
+
+    @classmethod
+    def of(cls, run: Run) -> "SummaryLine":
+        """Return the summary of a run."""
+        smallest = float(run.clearance.min())
+        clearance = _millimetres(smallest) if np.isfinite(smallest) else "infinite"
+        is_reached = run.outcome == Outcome.REACHED
+        words = (
+            (str(run.outcome).replace("_", " "), is_reached),
+            (f"{run.time[-1]:.3f} s", None),
+            (f"smallest clearance {clearance}", None),
+            ("certified" if run.certified else "not certified", run.certified),
+        )
+        detail = "" if is_reached else f"{run.outcome.description} {run.detail}".strip()
+        return cls(run.task.title, words, detail)
+
+
+class RenderScene:
+    """The arm, its goal, its way, the obstacles, the closest pair, and where to look from.
+
+    Args:
+        run: what to show.
+
+    Attributes:
+        time: of the frames (N,), from 0 [s]; they are samples of the run.
+        q: configuration at each frame (N, nq).
+        robot: bodies of the arm.
+        obstacles: bodies of the scene.
+        sensing_distance: the largest distance at which obstacles act, the margin included [m].
+        closest: the closest pair at each frame; empty where there are no pairs.
+        clearance: their distances [m].
+        closest_line: its line and ends, each as a mesh and where it is at each frame (N, 4, 4).
+        scale: what the colours of the path mean.
+        path: tube along the end effector's way; None if it hardly moves.
+        line_radius: of the path's tube, a good width for other lines [m].
+        floor: ends of the lines of a grid (K, 2, 3) [m].
+        camera: where to look from.
+    """
+
+    def __init__(self, run: Run) -> None:
+        task = run.task
+        self.run = run
+        self._model = task.arm.model
+        self._data = self._model.createData()
+        rows = _key_rows(run)
+        self.time, self.q = run.time[rows] - run.time[0], run.q[rows]
+        nearest = map(World(task.arm, task.scene).nearest, self.q)
+        self.closest = [pair for pair in nearest if pair is not None]
+        self.robot = arm_bodies(task.arm)
+        self.obstacles = obstacle_bodies(task.scene)
+        self._solid = [body for body in self.obstacles if body.has_end]
+        self.sensing_distance = task.margin + task.sensing.distance
+        self.clearance = np.array([pair.distance for pair in self.closest])
+        self.scale = ClearanceScale.fitting(self.clearance)
+        start = np.vstack([body.corners(self.joint_poses(run.q[0])) for body in self.robot])
+        self.line_radius = _PATH_RADIUS * float(np.ptp(start, axis=0).max())
+        self.closest_line = closest_line(self.closest, _CLOSEST_RADIUS * self.line_radius)
+        way = np.array([self._end_effector(q) for q in self.q])
+        self.path = self._path(way)
+        points = self._points_to_see()
+        self.floor = _floor(points)
+        watched = way[np.linspace(0, len(way) - 1, _WATCHED_SAMPLES).astype(int)]
+        self.camera = Camera.facing(points, watched, self._solid)
+
+    @property
+    def joints(self) -> list[str]:
+        """Name of each joint, the world first."""
+        return list(self._model.names)
+
+    def joint_poses(self, q: Array) -> list[pin.SE3]:
+        """Return the pose of each joint in the world at q (nq,)."""
+        pin.forwardKinematics(self._model, self._data, q)
+        return [pin.SE3(pose) for pose in self._data.oMi]
+
+    def _end_effector(self, q: Array) -> Array:
+        frame = self._model.frames[self.run.task.arm.end_effector_frame]
+        pose = self.joint_poses(q)[frame.parentJoint] * frame.placement
+        return np.array(pose.translation)
+
+    def _path(self, way: Array) -> TriangleMesh | None:
+        steps = [np.linalg.norm(after - before) for before, after in pairwise(way)]
+        travelled = np.concatenate([[0.0], np.cumsum(steps)])
+        count = int(travelled[-1] / self.line_radius)
+        if count < 2:
+            return None
+        at = np.linspace(0.0, travelled[-1], count)
+        points = np.column_stack([np.interp(at, travelled, way[:, axis]) for axis in range(3)])
+        distance = self.clearance if self.closest else np.full(len(way), np.inf)
+        clearance = np.interp(at, travelled, np.minimum(distance, self.scale.top))
+        return tube(points, self.line_radius, self.scale.colors(clearance))
+
+    def _points_to_see(self) -> Array:
+        rows = np.unique(np.linspace(0, len(self.q) - 1, _VIEWED_SAMPLES).astype(int))
+        goal = self.run.task.goal
+        poses = [self.joint_poses(q) for q in [*self.q[rows], *([] if goal is None else [goal])]]
+        points = np.vstack([body.corners(pose) for pose in poses for body in self.robot])
+        if not self._solid:
+            return points
+        low, high = points.min(axis=0), points.max(axis=0)
+        margin = _SURROUNDINGS * np.max(high - low)
+        corners = np.vstack([body.corners(poses[0]) for body in self._solid])
+        return np.vstack([points, np.clip(corners, low - margin, high + margin)])
+
+
+def closest_line(
+    closest: list[NearestPair], radius: float
+) -> dict[str, tuple[TriangleMesh, Array]]:
+    """Return a rod of a radius [m] and its two ends, each with its transforms (N, 4, 4)."""
+    if not closest:
+        return {}
+    corners = np.array(list(product((-1.0, 1.0), (-1.0, 1.0), (0.0, 1.0))))
+    rod, ball = sphere_swept_hull(corners, 0.0), sphere_swept_hull(np.zeros((1, 3)), 1.0)
+    first, second = np.stack([pair.points for pair in closest], axis=1)
+    return {
+        "line": (rod, np.array([_rod(a, b, radius) for a, b in zip(first, second, strict=True)])),
+        "first": (ball, _balls(first, _END * radius)),
+        "second": (ball, _balls(second, _END * radius)),
+    }
+
+
+def _rod(start: Array, end: Array, radius: float) -> Array:
+    """Return the transform that leads the unit rod along z from start to end."""
+    length = max(float(np.linalg.norm(end - start)), _SHORTEST)
+    up = np.array([0.0, 0.0, 1.0])
+    rotation = pin.Quaternion.FromTwoVectors(up, end - start + 1e-12 * up).matrix()
+    matrix = np.eye(4)
+    matrix[:3, :3] = rotation * [radius, radius, length]
+    matrix[:3, 3] = start
+    return matrix
+
+
+def _balls(centres: Array, radius: float) -> Array:
+    matrices = np.tile(np.diag([radius, radius, radius, 1.0]), (len(centres), 1, 1))
+    matrices[:, :3, 3] = centres
+    return matrices
+
+
+def _key_rows(run: Run) -> NDArray[np.int64]:
+    """Return the samples that are frames: evenly spaced ones, the closest and the last."""
+    frames = np.arange(run.time[0], run.time[-1], 1.0 / _FRAMES_PER_SECOND)
+    others = [int(run.clearance.argmin()), len(run.time) - 1]
+    return np.unique([*np.searchsorted(run.time, frames), *others])
+
+
+def _floor(points: Array) -> Array:
+    """Return the lines of a grid below points (N, 3), somewhat wider than they are."""
+    low, high = points.min(axis=0), points.max(axis=0)
+    middle = (low + high)[:2] / 2.0
+    half = np.max(high - low) / 2.0 + _FLOOR_CELL
+    first, last = (_FLOOR_CELL * np.round((middle + side * half) / _FLOOR_CELL) for side in (-1, 1))
+    z = min(0.0, low[2])
+    x, y = (np.arange(first[k], last[k] + _FLOOR_CELL / 2.0, _FLOOR_CELL) for k in range(2))
+    along_y = [[[at, y[0], z], [at, y[-1], z]] for at in x]
+    along_x = [[[x[0], at, z], [x[-1], at, z]] for at in y]
+    return np.array(along_y + along_x)
+
+
+def _millimetres(length: float) -> str:
+    value = 1e3 * length
+    return f"{value:.3g} mm" if abs(value) < 1e3 else f"{value:.0f} mm"

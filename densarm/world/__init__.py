@@ -1,0 +1,1 @@
+"""The world: distances of every pair of bodies, their changes, and proofs about motions."""

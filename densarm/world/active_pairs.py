@@ -1,0 +1,280 @@
+"""ActivePairs: the pairs of bodies that may be near, the only ones whose distances are queried."""
+
+import warnings
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import coal
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from densarm.arms.dynamics import Kinematics
+from densarm.arms.joint_space import joint_error
+from densarm.values.arrays import Array
+from densarm.values.kernels import compiled, compiled_part
+from densarm.world.distance_view import DistanceView
+from densarm.world.lipschitz import sliding_joints
+from densarm.world.world import COAL_TOLERANCE, DISTANCE_TOLERANCE, World
+
+_ASLEEP, _AWAKE = 0, 1
+_NEVER = 0  # seen, of a pair that must be queried
+_LONGEST_WAY = 1e4  # [rad or m], beyond which sums of small steps would round off too much
+
+
+class DistanceBounds(Protocol):
+    """Lower bounds of the distances of all pairs at one configuration, any to be made exact."""
+
+    @property
+    def distance(self) -> Array:
+        """Distances or lower bounds of them (K,) [m]; `query` overwrites it."""
+        ...
+
+    def query(self, pair: int) -> bool:
+        """Put the distance of a pair in the place of its bound; return False if it was there."""
+        ...
+
+
+@dataclass(frozen=True, eq=False)
+class ExactDistances:
+    """`DistanceBounds` of distances that are all known."""
+
+    distance: Array
+    """As `DistanceBounds.distance`."""
+
+    def query(self, pair: int) -> bool:  # noqa: ARG002
+        """Act as `DistanceBounds.query`."""
+        return False
+
+
+def longest_travel(
+    bounds: DistanceBounds, need: float | Array, rate: Array, enough: float = np.inf
+) -> float:
+    r"""Return how far along a motion the first pair has used its distance up.
+
+    .. math:: \min_{k:\, r_k > 0} (d_k - n_k) / r_k
+
+    A pair is queried where its bound alone makes it the first, so that the result is that of the
+    distances, to the last bit.
+
+    Args:
+        bounds: d_k.
+        need: n_k [m], one for all pairs or shape (K,).
+        rate: r_k ≥ 0 (K,), the motion of a pair per length of the way.
+        enough: length that needs no exact result: what exceeds it may be too short.
+
+    Returns:
+        A length, infinite where no pair moves.
+    """
+    while True:
+        travel, pair = _first(bounds.distance - need, rate)
+        if travel > enough or pair < 0 or not bounds.query(pair):
+            return travel
+
+
+def all_exceed(bounds: DistanceBounds, need: Array) -> bool:
+    """Return whether d_k > n_k [m] (K,) for every pair, d_k those of the bounds."""
+    return longest_travel(bounds, need, np.ones_like(need), enough=0.0) > 0.0
+
+
+class ActivePairs:
+    r"""Queries pairs that may be near, and bounds the distances of the others from below.
+
+    A pair whose distance was d_k at a query is at least
+
+    .. math:: d_k - \sum_j r_{kj} s_j
+
+    apart since, s_j being the way that joint j has gone, in steps along straight segments, and
+    r_kj the Lipschitz constants of the world. It sleeps, at no cost but this, until that falls to
+    its reach. All pairs wake while a slide is beyond its limits, where the constants do not hold;
+    pairs of an obstacle wake when it is moved.
+
+    Queried distances do not depend on what was queried before, to the last bit. These are
+    `DistanceBounds`: a sleeping pair can be woken by asking for its distance.
+
+    Args:
+        world: the pairs.
+        kinematics: placements that its owner updates before each `update` of the pairs, to the
+            same configuration; None for ones of their own.
+    """
+
+    def __init__(self, world: World, kinematics: Kinematics | None = None) -> None:
+        self.world = world
+        arm, self._geometry = world.arm, world.geometry_model
+        self._updates_kinematics = kinematics is None
+        self.kinematics = kinematics or Kinematics(arm)
+        """Placements and Jacobian at the last update."""
+        self._geometry_data = self._precise_data()
+        self._view = DistanceView(self._geometry_data)
+        self.rows: Array = self._view.read()
+        """[distance, normal, point 1, point 2] (K, 10) [m]; old where a pair is asleep."""
+        # Rows: awake, the version of `World.changes` that was queried, and a workspace.
+        self._pair_states = np.array([[_AWAKE], [_NEVER], [0]]).repeat(world.n_pairs, axis=1)
+        self.state: NDArray[np.int64] = self._pair_states[0]
+        """Nonzero where a pair is awake (K,)."""
+        # Second row: after the joints have gone a way s, level - lipschitz @ s bounds the distance.
+        self._pair_numbers = np.zeros((2, world.n_pairs))
+        self.reach: Array = self._pair_numbers[0]
+        """Distance up to which each pair is awake (K,) [m], which may be changed in place."""
+        self._bounds: Array | None = None
+        # Rows: the way gone, its last step, and the least and largest position of slides.
+        self._joint_numbers = np.zeros((4, arm.nv))
+        slides, rest = sliding_joints(arm.model), pin.neutral(arm.model)
+        self._joint_numbers[2] = np.where(slides, arm.limits.lower, -np.inf)
+        self._joint_numbers[3] = np.where(slides, arm.limits.upper, np.inf)
+        self._arrays: tuple[Any, ...] = (
+            rest.copy(),
+            arm.joint_index,
+            world.lipschitz,
+            self.rows,
+            self._joint_numbers,
+            self._pair_numbers,
+            self._pair_states,
+            world.changes,
+        )
+        self.update(rest)  # kernels are loaded, or compiled, before a control loop
+        self.wake_all()
+
+    @property
+    def distance(self) -> Array:
+        """Distances at the last update (K,) [m]: exact for pairs awake, else lower bounds."""
+        if self._bounds is None:
+            gone = self.world.lipschitz @ self._joint_numbers[0]
+            asleep = self._pair_numbers[1] - gone - DISTANCE_TOLERANCE
+            self._bounds = np.where(self.state == _ASLEEP, asleep, self.rows[:, 0])
+        return self._bounds
+
+    def query(self, pair: int) -> bool:
+        """Act as `DistanceBounds.query`, at the configuration of the last update."""
+        if self.state[pair] == _AWAKE:
+            return False
+        data = self._geometry_data
+        if not self.state.any():  # shapes were left where they were
+            self._place_shapes(data)
+        data.activateCollisionPair(pair)
+        pin.computeDistance(self._geometry, data, pair)
+        self._view.read()
+        self.state[pair] = _AWAKE
+        self.distance[pair] = self.rows[pair, 0]
+        return True
+
+    def wake_all(self) -> None:
+        """Query every pair at the next update."""
+        self._pair_states[1] = _NEVER
+
+    def update(self, q: Array) -> None:
+        """Query the pairs that may be within reach at q (nq,), and some others."""
+        data = self._geometry_data
+        n_awake, n_changed = _wake(q, *self._arrays)
+        self._bounds = None
+        for k in self._pair_states[2, :n_changed].tolist() if n_changed else ():
+            if k >= 0:
+                data.activateCollisionPair(k)
+            else:
+                data.deactivateCollisionPair(~k)
+        if self._updates_kinematics:
+            self.kinematics.update(q)
+        if n_awake:
+            self._place_shapes(data)
+            pin.computeDistances(self._geometry, data)
+            self._view.read()
+
+    def _place_shapes(self, data: pin.GeometryData) -> None:
+        kinematics = self.kinematics
+        pin.updateGeometryPlacements(kinematics.model, kinematics.data, self._geometry, data)
+
+    def _precise_data(self) -> pin.GeometryData:
+        """Return geometry data whose queries do not depend on those before, all made once."""
+        geometry = self._geometry
+        data = geometry.createData()
+        for item in geometry.geometryObjects:
+            item.geometry.computeLocalAABB()
+        with warnings.catch_warnings():
+            # Pinocchio asks for guesses from the last query, by a flag that coal calls deprecated.
+            warnings.simplefilter("ignore", DeprecationWarning)
+            for request in data.distanceRequests:
+                request.gjk_tolerance = request.epa_tolerance = COAL_TOLERANCE
+                request.enable_cached_gjk_guess = False
+                request.gjk_initial_guess = coal.GJKInitialGuess.BoundingVolumeGuess
+        self._place_shapes(data)
+        pin.computeDistances(geometry, data)
+        return data
+
+
+@compiled
+def _first(margin: Array, rate: Array) -> tuple[float, int]:
+    least, pair = np.inf, -1
+    for k in range(margin.shape[0]):
+        if rate[k] > 0.0 and margin[k] / rate[k] < least:
+            least, pair = margin[k] / rate[k], k
+    return least, pair
+
+
+@compiled
+def _wake(
+    q: Array,
+    q_last: Array,
+    joint_index: NDArray[np.int64],
+    lipschitz: Array,
+    rows: Array,
+    joint_numbers: Array,
+    pair_numbers: Array,
+    pair_states: NDArray[np.int64],
+    changes: NDArray[np.int64],
+) -> tuple[int, int]:
+    """Decide which pairs are awake at q; return how many, and how many changed.
+
+    Into the last row of `pair_states` go the indices of pairs that wake, and the complements of
+    those that fall asleep.
+    """
+    reach, level = pair_numbers[0], pair_numbers[1]
+    state, seen, changed = pair_states[0], pair_states[1], pair_states[2]
+    wakes_all = not _go(q, q_last, joint_index, joint_numbers)
+    way, step = joint_numbers[0], joint_numbers[1]
+    n_awake, n_changed = 0, 0
+    for k in range(state.shape[0]):
+        before, now, change = state[k], _AWAKE, changes[k]
+        if change < 0:  # spare
+            now, level[k] = _ASLEEP, np.inf
+        elif change == seen[k] and not wakes_all:
+            gone = _motion(lipschitz, k, way)
+            if before == _AWAKE:
+                level[k] = rows[k, 0] + (gone - _motion(lipschitz, k, step))
+            # A sleep of a few steps saves nothing, but pairs that close to their reach are few.
+            if level[k] - gone > reach[k] + 2.0 * DISTANCE_TOLERANCE:
+                now = _ASLEEP
+        state[k], seen[k] = now, change
+        n_awake += now
+        if now != before:
+            changed[n_changed] = k if now == _AWAKE else ~k
+            n_changed += 1
+    return n_awake, n_changed
+
+
+@compiled_part
+def _go(q: Array, q_last: Array, joint_index: NDArray[np.int64], joint_numbers: Array) -> bool:
+    """Add the last step to the way gone; return whether bounds hold that are older than it."""
+    way, step, low, high = joint_numbers[0], joint_numbers[1], joint_numbers[2], joint_numbers[3]
+    joint_error(q_last, q, joint_index, step)
+    holds = True
+    for j in range(way.shape[0]):
+        step[j] = abs(step[j])
+        way[j] += step[j]
+        x, y = q[joint_index[0, j]], q_last[joint_index[0, j]]
+        inside = (low[j] <= x) & (x <= high[j]) & (low[j] <= y) & (y <= high[j])
+        holds &= inside & (way[j] < _LONGEST_WAY)
+    # Entry by entry: a slice would compile, for seconds, the words of errors that cannot occur.
+    if not holds:
+        for j in range(way.shape[0]):
+            way[j] = 0.0
+    for i in range(q.shape[0]):
+        q_last[i] = q[i]
+    return holds
+
+
+@compiled_part
+def _motion(lipschitz: Array, pair: int, way: Array) -> float:
+    motion = 0.0
+    for j in range(way.shape[0]):
+        motion += lipschitz[pair, j] * way[j]
+    return motion

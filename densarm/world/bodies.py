@@ -1,0 +1,243 @@
+"""Bodies: an arm and its scene as arrays, placed by compiled code.
+
+A pose is a row of twelve numbers: the rotation matrix, row by row, then the translation [m].
+"""
+
+import math
+from collections.abc import Iterable
+from itertools import pairwise
+from typing import NamedTuple
+from weakref import WeakKeyDictionary
+
+import coal
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from densarm.scene.shapes import box_hull, convex_hull, extreme_points
+from densarm.values.arrays import Array
+from densarm.values.kernels import compiled_part
+from densarm.world.lipschitz import joint_axis
+from densarm.world.world import World
+
+_WIDEST = 1e3  # [m]
+
+Integers = NDArray[np.int64]
+
+
+class Bodies(NamedTuple):
+    """Sphere-swept hulls, convex hulls enlarged by a radius each, and the joints that move them."""
+
+    parent: Integers
+    """Joint that each joint moves with (njoints,)."""
+    joints: Array
+    """One row for each joint (njoints, 16): its pose at rest in its parent's frame, the unit vector
+    along which it slides or about which it turns, and 1 if it slides, else 0."""
+    joint: Integers
+    """Joint that moves each body (S,)."""
+    shapes: Array
+    """One row for each body (S, 17 + nv): the pose of its frame in that of its joint, half the
+    sides of a box around it, along the axes of its frame and about its origin [m], the radius of a
+    ball about that origin [m], by which its hull is enlarged [m], and `World.shape_lipschitz`."""
+    points: Array
+    """Corners of all hulls, each in its body's frame, one hull after the other (P, 3) [m]."""
+    edges: Integers
+    """Where the neighbours of each corner begin and end in this array (P + 1,), then the corners
+    that share an edge with a corner, one corner after the other."""
+    pairs: Integers
+    """Both bodies of each pair, and the last joint that moves both (K, 3).
+
+    If one of them is fixed to that joint, as it is in a chain, it is the second.
+    """
+
+
+BOX, BALL, RADIUS, LIPSCHITZ = 12, 15, 16, 17
+"""First columns of `Bodies.shapes` behind the pose."""
+
+
+def bodies_of(world: World) -> tuple[Bodies, Integers]:
+    """Return the bodies of a world, and for each pair some corner of both hulls (K, 2).
+
+    They are of the obstacles as they are now, kept until one changes, and not to be written to.
+    """
+    version, made = _MADE.get(world, (0, None))
+    if made is None or version != world.version:
+        made = _bodies(world)
+        _MADE[world] = (world.version, made)
+    return made
+
+
+# A plan proves under several margins, each time with the same bodies.
+_MADE: WeakKeyDictionary[World, tuple[int, tuple[Bodies, Integers]]] = WeakKeyDictionary()
+
+
+def _bodies(world: World) -> tuple[Bodies, Integers]:
+    shapes, model = list(world.geometry_model.geometryObjects), world.arm.model
+    hulls = [_hull(item.geometry) for item in shapes]
+    corners, radii = zip(*map(extreme_points, hulls), strict=True)
+    first, radius = np.cumsum([0, *map(len, corners)]), np.array(radii)
+    low, high = (np.array([end(each, axis=0) for each in corners]) for end in (np.min, np.max))
+    middles = 0.5 * (low + high)
+    centred = [each - middle for each, middle in zip(corners, middles, strict=True)]
+    frames = [
+        _pose_row(item.placement * pin.SE3(np.eye(3), middle))
+        for item, middle in zip(shapes, middles, strict=True)
+    ]
+    reach = np.array([np.linalg.norm(each, axis=1).max() for each in centred]) + radius
+    box = 0.5 * (high - low) + radius[:, np.newaxis]
+    joint = np.array([item.parentJoint for item in shapes], dtype=np.int64)
+    supports = [set(above) for above in model.supports]
+    shared = [max(supports[a] & supports[b]) for a, b in joint[world.pair_shapes]]
+    last = np.array(shared, dtype=np.int64)
+    is_first = joint[world.pair_shapes[:, :1]] == last[:, np.newaxis]
+    pairs = np.where(is_first, world.pair_shapes[:, ::-1], world.pair_shapes)
+    joints = np.zeros((model.njoints, 16))
+    for index, placement in enumerate(model.jointPlacements):
+        joints[index, :12] = _pose_row(placement)
+        if index > 0:
+            joints[index, 12:15], joints[index, 15] = joint_axis(model, index)
+    bodies = Bodies(
+        parent=np.array(list(model.parents), dtype=np.int64),
+        joints=joints,
+        joint=joint,
+        shapes=np.column_stack([np.array(frames), box, reach, radius, world.shape_lipschitz]),
+        points=np.vstack(centred),
+        edges=_edges(hulls, radii, first),
+        pairs=np.column_stack([pairs, last]),
+    )
+    return bodies, first[pairs]
+
+
+def _hull(shape: coal.CollisionGeometry) -> coal.CollisionGeometry:
+    """Return a cube with a face on the surface of a half-space, wider than anything reaches."""
+    if not isinstance(shape, coal.Halfspace):
+        return shape
+    turn = pin.Quaternion.FromTwoVectors(np.array([0.0, 0.0, 1.0]), shape.n).toRotationMatrix()
+    corners = np.array(box_hull([_WIDEST] * 3).points()) - [0.0, 0.0, 0.5 * _WIDEST]
+    return convex_hull(corners @ turn.T + shape.d * shape.n)
+
+
+def _edges(
+    hulls: list[coal.CollisionGeometry], radii: Iterable[float], first: Integers
+) -> Integers:
+    """Return `Bodies.edges`; all corners of a round shape are each other's neighbours."""
+    neighbours = [
+        [begin + other for other in (hull.neighbors(k) if radius == 0.0 else range(end - begin))]
+        for hull, radius, (begin, end) in zip(hulls, radii, pairwise(first.tolist()), strict=True)
+        for k in range(end - begin)
+    ]
+    ends = len(neighbours) + 1 + np.cumsum([0, *map(len, neighbours)])
+    return np.concatenate([ends, *neighbours]).astype(np.int64)
+
+
+def _pose_row(placement: pin.SE3) -> Array:
+    return np.concatenate([placement.rotation.ravel(), placement.translation])
+
+
+@compiled_part
+def place(
+    bodies: Bodies,
+    angles: Array,
+    step: Array,
+    share: float,
+    is_asked: NDArray[np.bool_],
+    joint_pose: Array,
+    pose: Array,
+) -> None:
+    """Write where joints and bodies are after a share of a motion.
+
+    Args:
+        bodies: the bodies.
+        angles: joint positions (nv,) [rad or m].
+        step: motion of the joints (nv,) [rad or m].
+        share: of the motion that was made.
+        is_asked: which bodies are to be placed (S,).
+        joint_pose: poses of the joints in the world (njoints, 12), overwritten.
+        pose: poses of the bodies (S, 12), overwritten.
+
+    Source: Rodrigues' formula: Lynch and Park, Modern Robotics, eq. 3.51.
+    """
+    joints = bodies.joints
+    for k in range(12):
+        joint_pose[0, k] = 1.0 if k in (0, 4, 8) else 0.0
+    for joint in range(1, bodies.parent.size):
+        row = joint_pose[joint]
+        _compose(joint_pose[bodies.parent[joint]], joints[joint], row)
+        x, y, z = joints[joint, 12], joints[joint, 13], joints[joint, 14]
+        position = angles[joint - 1] + share * step[joint - 1]
+        slide = position * joints[joint, 15]
+        turn = position - slide
+        c, s = math.cos(turn), math.sin(turn)
+        for i in range(0, 9, 3):
+            a, b, d = row[i], row[i + 1], row[i + 2]
+            along = a * x + b * y + d * z
+            row[9 + i // 3] += slide * along
+            along *= 1.0 - c
+            row[i] = c * a + s * (b * z - d * y) + along * x
+            row[i + 1] = c * b + s * (d * x - a * z) + along * y
+            row[i + 2] = c * d + s * (a * y - b * x) + along * z
+    for body in range(bodies.joint.size):
+        if is_asked[body]:
+            _compose(joint_pose[bodies.joint[body]], bodies.shapes[body], pose[body])
+
+
+@compiled_part
+def _compose(outer: Array, inner: Array, out: Array) -> None:
+    """Write a pose that is given in the frame of another, both rows of 12 or more numbers."""
+    for r in range(3):
+        a, b, c = outer[3 * r], outer[3 * r + 1], outer[3 * r + 2]
+        for column in range(3):
+            turned = a * inner[column] + b * inner[3 + column]
+            out[3 * r + column] = turned + c * inner[6 + column]
+        out[9 + r] = outer[9 + r] + (a * inner[9] + b * inner[10] + c * inner[11])
+
+
+@compiled_part
+def write_motion_bounds(
+    bodies: Bodies,
+    step: Array,
+    share: float,
+    is_asked: NDArray[np.bool_],
+    joint_pose: Array,
+    pose: Array,
+    bounds: Array,
+) -> None:
+    r"""Write, for bodies seen from each joint that moves them, bounds on their motion.
+
+    Let joint positions move at constant rates u_j over a unit of time, and let the point p of a
+    body be seen from the frame of a joint c. Over the joints j between c and the body,
+
+    .. math:: |p'| \le \mu_c = \sum_j r_j |u_j|, \qquad
+        |p''| \le \beta_c = \sum_j \omega_j (r_j |u_j| + 2 \mu_j),
+
+    ω_j = |u_j| for joints that turn and 0 for those that slide, r_j a bound on the distance of the
+    body from the axis of joint j (1 if it slides). Between the middle of the motion and either
+    end that distance changes by no more than half of μ_j.
+
+    Arguments as for `place`, with the poses in the middle of the motion; μ_c and β_c are written
+    to `bounds` (2, S, njoints) [m] where c moves the body or is 0.
+    """
+    joints, shapes = bodies.joints, bodies.shapes
+    for body in range(bodies.joint.size):
+        if not is_asked[body]:
+            continue
+        moved = bent = 0.0
+        j = bodies.joint[body]
+        while j > 0:
+            bounds[0, body, j], bounds[1, body, j] = moved, bent
+            slides, rate = joints[j, 15], share * abs(step[j - 1])
+            along = square = 0.0
+            for i in range(3):
+                axis = 0.0
+                for k in range(3):
+                    axis += joint_pose[j, 3 * i + k] * joints[j, 12 + k]
+                offset = pose[body, 9 + i] - joint_pose[j, 9 + i]
+                along += axis * offset
+                square += offset * offset
+            across = math.sqrt(max(0.0, square - along * along))
+            reach = slides + (1.0 - slides) * (across + 0.5 * moved + shapes[body, BALL])
+            travel = rate * min(shapes[body, LIPSCHITZ + j - 1], reach)
+            bent += (1.0 - slides) * rate * (travel + 2.0 * moved)
+            moved += travel
+            j = bodies.parent[j]
+        bounds[0, body, 0], bounds[1, body, 0] = moved, bent

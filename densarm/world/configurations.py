@@ -1,0 +1,88 @@
+"""Configurations that an arm can be at: why not, and random ones."""
+
+from collections.abc import Iterator, Mapping
+
+import numpy as np
+
+from densarm.arms.arm import Arm
+from densarm.arms.dynamics import holding_ratios, holding_torque
+from densarm.errors import DensarmError
+from densarm.values.arrays import Array
+from densarm.world.swept_check import SweptCheck
+from densarm.world.world import World
+
+_DRAWS = 10_000
+
+
+def infeasibility(check: SweptCheck, ends: Mapping[str, Array]) -> str:
+    """Return what makes an end of a motion infeasible, as a phrase; empty if nothing does.
+
+    That is a position outside the limits, a weight that the arm cannot hold, or a contact.
+
+    Args:
+        check: the world, and the margin that counts as contact.
+        ends: configurations (nq,) by what errors call them.
+    """
+    return "; ".join(
+        f"{name}: {fault}"
+        for name, q in ends.items()
+        for fault in [
+            *_limit_faults(check.arm, q),
+            *_holding_faults(check.arm, q),
+            *_contact_faults(check, q),
+        ]
+    )
+
+
+def clear_configurations(world: World, count: int, seed: int, margin: float = 0.0) -> list[Array]:
+    """Draw configurations evenly within the position limits, and keep those that are clear.
+
+    Joints without limits are drawn from a whole turn. The first ones stay the same when more are
+    drawn.
+
+    Args:
+        world: the arm among obstacles.
+        count: number of configurations.
+        seed: whole number >= 0.
+        margin: distance that every pair must exceed [m].
+
+    Returns:
+        Configurations (nq,).
+
+    Raises:
+        DensarmError: almost no configuration is clear.
+    """
+    random, arm = np.random.default_rng(seed), world.arm
+    lower = np.where(np.isfinite(arm.limits.lower), arm.limits.lower, -np.pi)
+    upper = np.where(np.isfinite(arm.limits.upper), arm.limits.upper, np.pi)
+
+    def draw() -> Array:
+        for _ in range(_DRAWS):
+            q = arm.configurations(random.uniform(lower, upper))
+            if world.distances(q).min(initial=np.inf) > margin:
+                return q
+        raise DensarmError(
+            f"robot {arm.name!r}: none of {_DRAWS} random configurations keeps "
+            f"{1e3 * margin:g} mm from contact"
+        )
+
+    return [draw() for _ in range(count)]
+
+
+def _limit_faults(arm: Arm, q: Array) -> Iterator[str]:
+    limits, angles = arm.limits, arm.angles(q)
+    for j in np.flatnonzero((angles < limits.lower) | (angles > limits.upper)):
+        allowed = f"[{limits.lower[j]:.4g}, {limits.upper[j]:.4g}]"
+        yield f"joint {arm.joint_names[j]!r} at {angles[j]:.4g} is outside {allowed}"
+
+
+def _holding_faults(arm: Arm, q: Array) -> Iterator[str]:
+    if holding_ratios(arm, q).max() > 1.0:
+        yield holding_torque(arm, q)
+
+
+def _contact_faults(check: SweptCheck, q: Array) -> Iterator[str]:
+    distance, pairs = check.world.distances(q), check.world.pairs
+    for k in np.argsort(distance)[: int((distance <= check.margin).sum())]:
+        pair, gap = " and ".join(pairs[k]), distance[k] * 1e3
+        yield f"{pair} overlap by {-gap:.3g} mm" if gap <= 0.0 else f"{pair} are {gap:.3g} mm apart"

@@ -1,0 +1,95 @@
+"""coal's results of all pairs as one array, and their gradients, without a Python loop per pair.
+
+Pinocchio keeps a `coal.DistanceResult` per pair in one C++ vector. Its fields distance, normal
+and the two nearest points are ten consecutive doubles, a layout that coal does not document:
+it is compared with the documented getters on the arm's own pairs when the view is made, and
+where it differs the getters are used instead. This file alone looks into that memory. A method
+of Pinocchio's `GeometryData` that returns these (K, 10) numbers as an array would end that.
+"""
+
+import ctypes
+
+import numpy as np
+import pinocchio as pin
+
+from densarm.values.arrays import Array
+from densarm.values.kernels import compiled, compiled_part
+
+_FIELDS = 10  # distance 1, normal 3, nearest point on body 1 and on body 2, 3 each
+
+
+class DistanceView:
+    """Distances [m], unit normals from body 1 to 2 and nearest points [m] of all pairs.
+
+    Args:
+        geometry_data: Pinocchio's data, all pairs present, distances computed at least once.
+    """
+
+    def __init__(self, geometry_data: pin.GeometryData) -> None:
+        self._geometry_data = geometry_data  # owns the memory that the view reads
+        self._results = list(geometry_data.distanceResults)
+        strided = self._strided()
+        self.is_direct = strided is not None
+        """Whether `read` costs no copy."""
+        self._rows = np.zeros((len(self._results), _FIELDS)) if strided is None else strided
+
+    def read(self) -> Array:
+        """Return rows [distance, normal, point 1, point 2], shape (K, 10), of the last query."""
+        if not self.is_direct:
+            self._rows[:] = self._by_getters()
+        return self._rows
+
+    def _strided(self) -> Array | None:
+        if not self._results:
+            return None
+        addresses = [result.normal.__array_interface__["data"][0] for result in self._results]
+        steps = np.diff(addresses)
+        stride = int(steps[0]) if len(steps) else _FIELDS * 8
+        if (steps != stride).any() or stride < _FIELDS * 8 or stride % 8 != 0:
+            return None
+        count = (stride // 8) * (len(addresses) - 1) + _FIELDS
+        memory = (ctypes.c_double * count).from_address(addresses[0] - 8)
+        rows = np.lib.stride_tricks.as_strided(
+            np.ctypeslib.as_array(memory), (len(addresses), _FIELDS), (stride, 8), writeable=False
+        )
+        return rows if np.array_equal(rows, self._by_getters()) else None
+
+    def _by_getters(self) -> Array:
+        rows = [
+            [r.min_distance, *r.normal, *r.getNearestPoint1(), *r.getNearestPoint2()]
+            for r in self._results
+        ]
+        return np.array(rows, dtype=np.float64).reshape(-1, _FIELDS)
+
+
+@compiled
+def add_pair_gradients(rows: Array, jacobian: Array, sign: Array, out: Array) -> None:
+    """Add the gradients of all distances to `out` (K, nv), with rows (K, 10) and S_2 - S_1 (K, nv).
+
+    The world-frame joint Jacobian is (6, nv).
+    """
+    for k in range(rows.shape[0]):
+        add_pair_gradient(rows[k], jacobian, sign[k], 1.0, out[k])
+
+
+@compiled_part
+def add_pair_gradient(row: Array, jacobian: Array, sign: Array, factor: float, out: Array) -> None:
+    """Add a multiple of the gradient of one distance in place.
+
+    Args:
+        row: [distance, normal, point 1, point 2], as `DistanceView` has it (10,).
+        jacobian: world-frame joint Jacobian (6, nv).
+        sign: S_2 - S_1 (nv,).
+        factor: of the gradient.
+        out: added to (nv,).
+    """
+    nx, ny, nz = row[1], row[2], row[3]
+    px, py, pz = row[4], row[5], row[6]
+    mx, my, mz = py * nz - pz * ny, pz * nx - px * nz, px * ny - py * nx
+    for j in range(sign.shape[0]):
+        if sign[j] != 0.0:
+            slope = nx * jacobian[0, j] + ny * jacobian[1, j] + nz * jacobian[2, j]
+            slope += mx * jacobian[3, j]
+            slope += my * jacobian[4, j]
+            slope += mz * jacobian[5, j]
+            out[j] += factor * (sign[j] * slope)

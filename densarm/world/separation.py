@@ -1,0 +1,227 @@
+"""Separation: lower bounds on the distance of two convex bodies, each by a plane between them."""
+
+import math
+
+from densarm.values.arrays import Array
+from densarm.values.kernels import compiled_part
+from densarm.world.bodies import Bodies, Integers
+
+ACCURACY = 0.01
+"""Share of the distance that a bound may fall short of it by."""
+
+_ITERATIONS = 40
+_CONTACT = 1e-9  # [m], closer than this no plane is looked for
+_NO_WEIGHT = 1e-12
+_FLAT = 1e-12  # of a corner's squared distance, what may be left of it beside the others
+
+
+@compiled_part
+def separation(
+    bodies: Bodies,
+    pose: Array,
+    i: int,
+    j: int,
+    needed: float,
+    enough: float,
+    corners: Integers,
+    work: Array,
+    normal: Array,
+) -> float:
+    r"""Return a lower bound on the distance of hulls A and B, zero where they may touch.
+
+    For every unit vector n,
+
+    .. math:: d(A, B) \ge \min_{a \in A} n \cdot a - \max_{b \in B} n \cdot b,
+
+    so that any n whose right-hand side is positive is a proof, however it was found. Here it is
+    improved by the algorithm of Gilbert, Johnson and Keerthi until the bound is within `ACCURACY`
+    of the distance, or enough, or the distance is less than what is needed. Corners are climbed to
+    along edges. Radii are not taken off.
+
+    Args:
+        bodies: their `points` and `edges` are used.
+        pose: of all hulls in the world (S, 12).
+        i: index of A.
+        j: index of B.
+        needed: a distance below which the bound does not matter [m].
+        enough: a bound that need not be improved [m].
+        corners: pairs of corners (4, 2), -1 where there is none, whose differences span a simplex
+            near the origin, at least one; a guess, such as the last call's, that is improved.
+        work: space to work in (8, 4).
+        normal: the plane's unit normal (3,), from B to A, is written if the bound is positive.
+
+    Returns:
+        The bound [m], >= 0.
+
+    Source: Gilbert, Johnson, Keerthi, A Fast Procedure for Computing the Distance Between Complex
+        Objects in Three-Dimensional Space, IEEE J. Robotics and Automation 1988.
+    """
+    simplex, system, point = work[:4], work[4:], work[4]
+    count = corners.shape[0]
+    while corners[count - 1, 0] < 0:
+        count -= 1
+    for k in range(count):
+        _write_difference(bodies.points, pose, i, j, corners, k, simplex)
+        simplex[k, 3] = 0.0
+    simplex[0, 3] = 1.0  # all weight on the first
+    best = 0.0
+    for _ in range(_ITERATIONS):
+        count = _approach_origin(simplex, system, corners, count)
+        norm = math.sqrt(point[0] * point[0] + point[1] * point[1] + point[2] * point[2])
+        if count == 4 or norm < _CONTACT:  # the bodies may overlap
+            count = min(count, 3)
+            break
+        climb(bodies, pose, i, j, corners[count - 1], point, corners[count])
+        _write_difference(bodies.points, pose, i, j, corners, count, simplex)
+        x, y, z = simplex[count, 0], simplex[count, 1], simplex[count, 2]
+        gap = (point[0] * x + point[1] * y + point[2] * z) / norm
+        if gap > best:
+            best = gap
+            for axis in range(3):
+                normal[axis] = point[axis] / norm
+        if norm <= needed or _is_known(corners, count):
+            break
+        simplex[count, 3] = 0.0
+        count += 1
+        if best >= enough or best >= (1.0 - ACCURACY) * norm:
+            break
+    for k in range(count, 4):
+        corners[k, 0] = corners[k, 1] = -1
+    return best
+
+
+@compiled_part
+def climb(
+    bodies: Bodies,
+    pose: Array,
+    i: int,
+    j: int,
+    start: Integers,
+    direction: Array,
+    end: Integers,
+) -> float:
+    """Return how far hull A is beyond hull B along a vector of the world, times its length [m].
+
+    Corners of A and B (2,) are climbed from along edges, and those at the end are written. Other
+    arguments as for `separation`.
+    """
+    points, edges, beyond = bodies.points, bodies.edges, 0.0
+    for side in range(2):
+        hull, sign, corner = (j if side else i), 2.0 * side - 1.0, start[side]
+        a = b = c = at = 0.0
+        for k in range(3):
+            x = sign * direction[k]
+            a += pose[hull, 3 * k] * x
+            b += pose[hull, 3 * k + 1] * x
+            c += pose[hull, 3 * k + 2] * x
+            at += pose[hull, 9 + k] * x
+        best = points[corner, 0] * a + points[corner, 1] * b + points[corner, 2] * c
+        climbing = True
+        while climbing:
+            climbing = False
+            for k in range(edges[corner], edges[corner + 1]):
+                near = edges[k]
+                value = points[near, 0] * a + points[near, 1] * b + points[near, 2] * c
+                if value > best:
+                    best, corner, climbing = value, near, True
+        end[side] = corner
+        beyond -= best + at
+    return beyond
+
+
+@compiled_part
+def _write_difference(
+    points: Array, pose: Array, i: int, j: int, corners: Integers, row: int, simplex: Array
+) -> None:
+    a, b = corners[row, 0], corners[row, 1]
+    for k in range(3):
+        difference = pose[i, 9 + k] - pose[j, 9 + k]
+        for n in range(3):
+            difference += pose[i, 3 * k + n] * points[a, n] - pose[j, 3 * k + n] * points[b, n]
+        simplex[row, k] = difference
+
+
+@compiled_part
+def _is_known(corners: Integers, last: int) -> bool:
+    """Return whether the last pair of corners is one of those before it."""
+    for k in range(last):
+        if corners[k, 0] == corners[last, 0] and corners[k, 1] == corners[last, 1]:
+            return True
+    return False
+
+
+@compiled_part
+def _approach_origin(simplex: Array, system: Array, corners: Integers, count: int) -> int:
+    """Reduce a simplex to a face whose plane is nearest to the origin inside that face.
+
+    Args:
+        simplex: its corners and their weights >= 0 (4, 4): the point to start from; overwritten by
+            the nearest point, corners that are kept moved to the front.
+        system: space to work in (4, 4); the nearest point is written to its first row.
+        corners: what the corners are differences of (4, 2), moved alike.
+        count: number of corners.
+
+    Returns:
+        The number of corners left; 4 if the origin is inside the tetrahedron.
+
+    Source: Wolfe, Finding the Nearest Point in a Polytope, Mathematical Programming 1976.
+    """
+    before = 0
+    while count != before:
+        before = count
+        if not _write_affine_weights(simplex, system, count):
+            count -= 1  # the newest corner depends on the others
+            continue
+        share = 1.0
+        for k in range(count):
+            weight, affine = simplex[k, 3], system[3, k]
+            if affine <= 0.0:
+                share = min(share, weight / (weight - affine))
+        count = 0
+        for k in range(before):
+            value = simplex[k, 3] + share * (system[3, k] - simplex[k, 3])
+            if value > _NO_WEIGHT:
+                for n in range(3):
+                    simplex[count, n] = simplex[k, n]
+                simplex[count, 3] = value
+                corners[count, 0], corners[count, 1] = corners[k, 0], corners[k, 1]
+                count += 1
+    for axis in range(3):
+        system[0, axis] = 0.0
+        for k in range(count):
+            system[0, axis] += simplex[k, 3] * simplex[k, axis]
+    return count
+
+
+@compiled_part
+def _write_affine_weights(simplex: Array, system: Array, count: int) -> bool:
+    """Write weights of the point nearest to the origin in the plane through all corners.
+
+    They go to the last row of `system`; none are written, and False is returned, where the corners
+    are not independent. Arguments as for `_approach_origin`.
+    """
+    n = count - 1
+    for i in range(n):
+        for j in range(n + 1):
+            total = 0.0
+            for k in range(3):
+                end = simplex[j, k] if j < n else 0.0
+                total += (simplex[i, k] - simplex[n, k]) * (end - simplex[n, k])
+            system[i, j] = total
+    for i in range(n):
+        length = system[i, i]
+        for j in range(i):
+            share = system[i, j] / system[j, j]
+            for k in range(j, n + 1):
+                system[i, k] -= share * system[j, k]
+        if not system[i, i] > _FLAT * length:
+            return False
+    last = 1.0
+    for i in range(n - 1, -1, -1):
+        value = system[i, n]
+        for j in range(i + 1, n):
+            value -= system[i, j] * system[3, j]
+        system[3, i] = value / system[i, i]
+        last -= system[3, i]
+    system[3, n] = last
+    return True

@@ -1,0 +1,212 @@
+"""World: an arm among obstacles, the distances of all pairs of bodies, and how far they move."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import ArrayLike, NDArray
+
+from densarm.arms.arm import Arm
+from densarm.errors import InvalidValueError
+from densarm.scene.obstacles import Obstacle, geometry_objects
+from densarm.scene.scene import Scene
+from densarm.values.arrays import Array
+from densarm.values.documented import documented
+from densarm.world.distance_view import DistanceView, add_pair_gradients
+from densarm.world.lipschitz import joint_support, shape_lipschitz
+from densarm.world.obstacle_slots import ChangingObstacles
+
+COAL_TOLERANCE = 1e-10
+"""GJK and EPA tolerance [m]; at coal's default of 1e-6 gradients err by up to 4e-3."""
+
+DISTANCE_TOLERANCE = 1e-7
+"""Bound on the error of a computed distance that certificates subtract [m].
+
+Above it the largest error measured, between hulls with faces nearly parallel, is 2e-8 m.
+"""
+
+Pairs = NDArray[np.int64]
+"""Indices of pairs (P,)."""
+
+
+@documented
+@dataclass(frozen=True)
+class ClearanceSample:
+    """Clearance at one configuration."""
+
+    distance: Array
+    """Signed distance d_k of each pair (K,) [m]; negative in penetration."""
+    gradient: Array
+    """Gradient of each distance in the joint tangent space (K, nv) [m/rad or m/m]."""
+    pairs: tuple[tuple[str, str], ...]
+    """Names of the two bodies of each pair."""
+
+
+@documented
+@dataclass(frozen=True)
+class NearestPair:
+    """The two bodies that are nearest to each other at one configuration."""
+
+    distance: float
+    """Signed distance [m]."""
+    points: Array
+    """The point of each body nearest to the other (2, 3), in the world frame [m]."""
+    names: tuple[str, str]
+    """Names of the bodies."""
+
+
+class World(ChangingObstacles):
+    """An arm among obstacles: signed distances d_k(q) of every pair of bodies, itself included.
+
+    With n_k the unit normal from body 1 to body 2 and p_k a nearest point, the gradient is
+
+        ∂d_k/∂q = [n_k, p_k × n_k] · J(q) (S_2 - S_1),
+
+    J the world-frame joint Jacobian and S_b the joints that move body b.
+
+    Obstacles can be moved, added and removed between queries, at a cost that does not grow with
+    the scene. Room for those to come is made beforehand: a spare obstacle stands for any of its
+    shape and size, a spare sphere or capsule for those of any size. What finds no spare one needs
+    a new world with more of them and a new controller, which take milliseconds: made apart from
+    the control loop, `change_to` brings them up to date between two steps.
+
+    Args:
+        arm: the arm; its collision model holds the self-collision pairs.
+        scene: the obstacles. Shapes that no joint moves are not paired with them.
+        spare: obstacles that are not there yet, at infinite distance until they are added.
+
+    Raises:
+        InvalidValueError: an obstacle is named like a shape of the arm or another obstacle, or
+            the scene attaches bodies that the arm does not hold.
+    """
+
+    def __init__(self, arm: Arm, scene: Scene, spare: Iterable[Obstacle] = ()) -> None:
+        self.arm = arm
+        reserve = Scene([*scene, *spare], scene.attachments)
+        model = _geometry_model(arm, reserve)
+        pair_shapes = [(pair.first, pair.second) for pair in model.collisionPairs]
+        super().__init__(model, np.array(pair_shapes, dtype=np.int64).reshape(-1, 2), reserve)
+        self.n_pairs = len(pair_shapes)
+        self._geometry_data, self._data = model.createData(), arm.model.createData()
+        # A view that follows the data; Pinocchio drops the second axis of a single column.
+        self._jacobian = self._data.J.reshape(6, arm.nv)
+        for request in self._geometry_data.distanceRequests:
+            request.gjk_tolerance = request.epa_tolerance = COAL_TOLERANCE
+        shapes = model.geometryObjects
+        moves = joint_support(arm.model)[np.array([item.parentJoint for item in shapes], np.int64)]
+        first, second = self.pair_shapes.T
+        self.sign: Array = moves[second] - moves[first]
+        """S_2 - S_1 (K, nv): how each joint moves body 2 of a pair against body 1."""
+        self.shape_lipschitz: Array = shape_lipschitz(arm.model, shapes)
+        """For each shape the bounds r_j of the joints that move it (S, nv), else 0 [m/rad or 1]."""
+        apart = 1.0 - moves[first] * moves[second]
+        self.lipschitz: Array = (self.shape_lipschitz[first] + self.shape_lipschitz[second]) * apart
+        """Lipschitz constants r_kj of the distances (K, nv) [m/rad, 1 for prismatic joints].
+
+        r_kj bounds, over all configurations within the position limits, the distance from the axis
+        of joint j to any point of the body that it moves; 0 where it moves both bodies or neither.
+        """
+        pin.computeDistances(
+            arm.model, self._data, model, self._geometry_data, pin.neutral(arm.model)
+        )
+        self._view = DistanceView(self._geometry_data)
+        for obstacle in reserve.obstacles[len(scene) :]:
+            self.remove_obstacle(obstacle.name)
+        self._is_spare, self._skipped = np.zeros(self.n_pairs, bool), 0
+
+    def clearance(self, q: ArrayLike) -> ClearanceSample:
+        """Return the distances of all pairs and their gradients.
+
+        Args:
+            q: configuration (nq,).
+
+        Raises:
+            InvalidValueError: q is not a configuration of the arm.
+        """
+        q = self.arm.check_configuration("configuration", q)
+        gradient = np.zeros((self.n_pairs, self.arm.nv))
+        pin.computeJointJacobians(self.arm.model, self._data, q)
+        rows = self._measured()
+        add_pair_gradients(rows, self._jacobian, self.sign, gradient)
+        gradient[self._is_spare] = 0.0
+        distance = np.where(self._is_spare, np.inf, rows[:, 0])
+        return ClearanceSample(distance, gradient, self.pairs)
+
+    def distances(self, q: Array, pairs: Pairs | None = None) -> Array:
+        """Return the distances alone, without checks.
+
+        Args:
+            q: configuration (nq,).
+            pairs: indices of the pairs to compute; None for all.
+
+        Returns:
+            Distances (K,), or those of the pairs (P,) [m], in a new array.
+        """
+        pin.forwardKinematics(self.arm.model, self._data, q)
+        rows = self._measured(pairs)
+        distance = np.where(self._is_spare, np.inf, rows[:, 0])
+        return distance if pairs is None else distance[pairs]
+
+    def nearest(self, q: Array) -> NearestPair | None:
+        """Return the nearest two bodies at a configuration (nq,), None without pairs."""
+        distance = self.distances(q)
+        if not np.isfinite(distance).any():
+            return None
+        k = int(distance.argmin())
+        points = self._view.read()[k, 4:].reshape(2, 3).copy()
+        return NearestPair(float(distance[k]), points, self.pairs[k])
+
+    def motion_bound(self, step: Array, pairs: Pairs | None = None) -> Array:
+        r"""Return how far the bodies of each pair move against each other at most [m].
+
+        .. math:: \mu_k = \sum_j r_{kj} |\Delta q_j|
+
+        Args:
+            step: joint motions (..., nv) [rad or m], within the position limits.
+            pairs: indices of the pairs to look at; None for all.
+
+        Returns:
+            Bounds (..., K), or (..., P) [m].
+        """
+        lipschitz = self.lipschitz if pairs is None else self.lipschitz[pairs]
+        return np.asarray(np.abs(step) @ lipschitz.T)
+
+    def _measured(self, pairs: Pairs | None = None) -> Array:
+        """Return the rows of `DistanceView`, new for some pairs or all."""
+        model, data = self.geometry_model, self._geometry_data
+        if self._skipped != self.version:
+            self._skip_spare_pairs()
+        pin.updateGeometryPlacements(self.arm.model, self._data, model, data)
+        if pairs is not None and len(pairs) < self.n_pairs:
+            for k in pairs.tolist():
+                pin.computeDistance(model, data, k)
+        else:
+            pin.computeDistances(model, data)
+        return self._view.read()
+
+    def _skip_spare_pairs(self) -> None:
+        is_spare, self._skipped = self.changes < 0, self.version
+        for k in np.flatnonzero(is_spare != self._is_spare).tolist():
+            if is_spare[k]:
+                self._geometry_data.deactivateCollisionPair(k)
+            else:
+                self._geometry_data.activateCollisionPair(k)
+        self._is_spare = is_spare
+
+
+def _geometry_model(arm: Arm, scene: Scene) -> pin.GeometryModel:
+    for attachment in scene.attachments:
+        if attachment not in arm.description.attachments:
+            name, allowed = attachment.body.name, "held by the arm: arm.holding(*scene.attachments)"
+            raise InvalidValueError("attached body", name, allowed)
+    model = arm.collision_model.copy()
+    moving = [k for k, item in enumerate(model.geometryObjects) if item.parentJoint > 0]
+    for item in [item for obstacle in scene for item in geometry_objects(obstacle)]:
+        if model.existGeometryName(item.name):
+            allowed = f"other than the names of the shapes of {arm.name!r}"
+            raise InvalidValueError("obstacle name", item.name, allowed)
+        index = model.addGeometryObject(item)
+        for k in moving:
+            model.addCollisionPair(pin.CollisionPair(int(k), int(index)))
+    return model

@@ -1,0 +1,109 @@
+"""Which links of an arm are checked against each other."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from densarm.arms.arm import Arm, load_arm
+from densarm.arms.description import RobotDescription
+from densarm.arms.self_collision import Exclusion
+
+DATA = Path(__file__).parents[1] / "data"
+
+
+def named_pairs(arm: Arm) -> set[frozenset[str]]:
+    names = [item.name for item in arm.collision_model.geometryObjects]
+    pairs = arm.collision_model.collisionPairs
+    return {frozenset((names[pair.first], names[pair.second])) for pair in pairs}
+
+
+def expected(*pairs: tuple[str, str]) -> set[frozenset[str]]:
+    return {frozenset(f"{link}_0" for link in pair) for pair in pairs}
+
+
+APART = (
+    ("base", "carriage"),
+    ("base", "left_arm"),
+    ("base", "right_arm"),
+    ("base", "blade"),
+    ("column", "left_arm"),
+    ("column", "right_arm"),
+    ("column", "blade"),
+    ("carriage", "blade"),
+    ("left_arm", "blade"),
+)
+
+
+def left_out(arm: Arm, reason: Exclusion) -> set[frozenset[str]]:
+    return {frozenset(pair.shapes) for pair in arm.excluded_pairs if pair.reason == reason}
+
+
+def test_neighbours_are_left_out() -> None:
+    arm = load_arm(DATA / "branching.urdf")
+    assert named_pairs(arm) == expected(*APART, ("left_arm", "right_arm"))
+    assert expected(("base", "column"), ("right_arm", "blade")) < left_out(
+        arm, Exclusion.NEIGHBOURS
+    )
+
+
+def test_srdf_disables_pairs() -> None:
+    arm = load_arm(DATA / "branching.urdf", srdf=DATA / "branching.srdf")
+    assert named_pairs(arm) == expected(*APART)
+    assert left_out(arm, Exclusion.SRDF) == expected(("left_arm", "right_arm"))
+
+
+def test_panda_srdf_leaves_pairs_that_can_collide() -> None:
+    pairs = named_pairs(load_arm("panda"))
+    assert expected(("panda_link0", "panda_hand"), ("panda_link2", "panda_hand")) <= pairs
+    assert not expected(("panda_link6", "panda_hand")) & pairs
+
+
+INERTIAL = (
+    '<inertial><mass value="1"/>'
+    '<inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial>'
+)
+
+
+def arm_with_collar(radius: float) -> Arm:
+    """Three links in a row, the last one with a ball around its joint."""
+    links = ["base", "one", "two", "three"]
+    body = "".join(
+        f'<link name="{link}">{INERTIAL}<collision><geometry><sphere radius="{size}"/></geometry>'
+        "</collision></link>"
+        for link, size in zip(links, [0.1, 0.1, 0.1, radius], strict=True)
+    )
+    body += "".join(
+        f'<joint name="j{k}" type="revolute"><origin xyz="0.5 0 0"/><parent link="{links[k]}"/>'
+        f'<child link="{links[k + 1]}"/><axis xyz="0 0 1"/>'
+        '<limit lower="-3" upper="3" effort="1" velocity="1"/></joint>'
+        for k in range(3)
+    )
+    return Arm(RobotDescription(name="row", urdf=f'<robot name="row">{body}</robot>'))
+
+
+def test_pairs_that_always_collide_are_left_out() -> None:
+    # one and three are 1 m apart at most, base and three 1.5 m.
+    assert named_pairs(arm_with_collar(0.1)) == expected(
+        ("base", "two"), ("base", "three"), ("one", "three")
+    )
+    collared = arm_with_collar(0.95)
+    assert named_pairs(collared) == expected(("base", "two"), ("base", "three"))
+    assert left_out(collared, Exclusion.ALWAYS) == expected(("one", "three"))
+    assert named_pairs(arm_with_collar(0.85)) == named_pairs(arm_with_collar(0.1))
+
+
+@pytest.mark.parametrize("limit", ["1e15", "1.7e308"])
+def test_wide_limits(limit: str) -> None:
+    urdf = (DATA / "branching.urdf").read_text()
+    urdf = urdf.replace('lower="-2" upper="1.5"', f'lower="-{limit}" upper="{limit}"')
+    description = RobotDescription(name="wide", urdf=urdf, package_dirs=(str(DATA),))
+    assert named_pairs(Arm(description)) == expected(*APART, ("left_arm", "right_arm"))
+
+
+def test_the_global_random_state_is_left_alone() -> None:
+    np.random.seed(0)  # noqa: NPY002
+    expected_number = np.random.random()  # noqa: NPY002
+    np.random.seed(0)  # noqa: NPY002
+    load_arm("two_link")
+    assert np.random.random() == expected_number  # noqa: NPY002

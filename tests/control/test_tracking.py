@@ -1,0 +1,199 @@
+"""DensityTracking: its one kernel is the law of its parts, whichever pairs are queried."""
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+import pytest
+
+from densarm.arms.arm import Arm
+from densarm.control.controller import Gains
+from densarm.control.inverse_dynamics import InverseDynamics
+from densarm.control.tracking import DensityTracking
+from densarm.density.goal_distance import TorusDistance
+from densarm.density.navigation_density import DensityParameters, Gauge, NavigationDensity
+from densarm.density.unsafe_sets import (
+    ClearanceSet,
+    ImplicitSet,
+    JointLimitSet,
+    SensingParameters,
+    UnsafeSet,
+)
+from densarm.errors import InvalidValueError
+from densarm.planning.motion import Motion
+from densarm.scenarios.scenario import Scenario
+from densarm.values.arrays import Array
+from densarm.world.active_pairs import ActivePairs
+from densarm.world.stopping import HELD_SHARE
+from densarm.world.swept_check import SweptCheck
+from densarm.world.world import World
+
+State = tuple[float, Array, Array]
+GAINS = Gains()
+
+
+def states(arm: Arm, motion: Motion, off: float = 0.03, every: int = 1) -> Iterator[State]:
+    """Times and states near the motion, near enough to obstacles that they are sensed."""
+    random = np.random.default_rng(0)
+    for k in range(0, len(motion.position), every):
+        shift = off * random.normal(size=(2, arm.nv))
+        q = arm.configuration(motion.position[k] + shift[0])
+        yield k * motion.period, q, motion.velocity[k] + shift[1]
+
+
+def tracked_density(world: World, motion: Motion) -> NavigationDensity:
+    """The density that senses nothing on the motion, by the words of `DensityTracking`."""
+    arm, sensing = world.arm, SensingParameters()
+    on_the_way = arm.configurations(motion.position[::2])
+    check = SweptCheck(world, motion.margin)
+    least = np.min([check.distance_margin(q) for q in on_the_way], axis=0)
+    angles, limits = arm.angles(on_the_way), arm.limits
+    inside = np.minimum(angles - limits.lower, limits.upper - angles).min(axis=0)
+    share = sensing.path_share
+    unsafe: list[UnsafeSet] = [
+        ClearanceSet(world, motion.margin, np.minimum(share * least, sensing.distance)),
+        JointLimitSet(arm, np.minimum(share * inside, sensing.joint)),
+    ]
+    return NavigationDensity(arm, on_the_way[0], unsafe, TorusDistance(arm))
+
+
+def test_torque_is_that_of_its_parts(panda: Arm, panda_swing: Motion, among_spheres: World) -> None:
+    controller = DensityTracking(among_spheres, panda_swing, gains=GAINS)
+    density = tracked_density(among_spheres, panda_swing)
+    dynamics = InverseDynamics(panda, HELD_SHARE * panda.limits.acceleration)
+    sensed = 0
+    for t, q, v in states(panda, panda_swing):
+        point = panda_swing.sample(t, lead=0.5 * panda_swing.period)
+        density.set_goal(panda.configuration(point.position))
+        attract = density.evaluate(q).gradient(Gauge.RECIPROCAL)
+        dynamics.update(q, v)
+        brake = point.acceleration - GAINS.velocity * (v - point.velocity)
+        expected = dynamics.torque(brake, GAINS.position * attract)
+        np.testing.assert_allclose(controller.torque(t, q, v), expected, rtol=1e-12, atol=1e-12)
+        error = np.abs(panda.difference(density.goal, q)).max()
+        assert controller.tracking_error == pytest.approx(error, rel=1e-9)
+        sensed += density.log_psi < 0.0
+    assert sensed > 10
+
+
+def test_torque_is_that_of_all_pairs_to_the_last_bit(
+    panda: Arm, panda_swing: Motion, among_spheres: World, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    update, awake, wakes = ActivePairs.update, list[int](), False
+
+    def watched(pairs: ActivePairs, q: Array) -> None:
+        if wakes:
+            pairs.wake_all()
+        update(pairs, q)
+        awake.append(int(np.count_nonzero(pairs.state)))
+
+    monkeypatch.setattr(ActivePairs, "update", watched)
+    few, every = (DensityTracking(among_spheres, panda_swing) for _ in range(2))
+    for state in states(panda, panda_swing):
+        wakes = False
+        expected = few.torque(*state)
+        assert awake[-1] < among_spheres.n_pairs
+        wakes = True
+        np.testing.assert_array_equal(every.torque(*state), expected)
+        assert awake[-1] == among_spheres.n_pairs
+
+
+class Own:
+    """The torus distance, as somebody else's own function."""
+
+    def __init__(self, arm: Arm, **parameters: Any) -> None:
+        self._distance = TorusDistance(arm, **parameters)
+
+    def evaluate(self, q: Array, goal: Array, out_gradient: Array) -> float:
+        return self._distance.evaluate(q, goal, out_gradient)
+
+
+@pytest.mark.parametrize("kappa", [1.0, np.inf])
+@pytest.mark.parametrize("name", ["panda", "two_link"])
+def test_an_own_goal_distance_of_the_same_values_gives_the_same_torque(
+    request: pytest.FixtureRequest, name: str, kappa: float
+) -> None:
+    if name == "panda":
+        world, motion = (request.getfixturevalue(f) for f in ("among_spheres", "panda_swing"))
+    else:
+        world = request.getfixturevalue("swing_up").world
+        motion = request.getfixturevalue("swing_up_motion")
+    arm, every = world.arm, len(motion.position) // 50
+    weights = np.linspace(0.5, 2.0, arm.nv)
+    own, built_in = (
+        DensityTracking(world, motion, goal_distance=kind(arm, weights=weights, kappa=kappa))
+        for kind in (Own, TorusDistance)
+    )
+    for state in states(arm, motion, 0.1, every):
+        expected = built_in.torque(*state)
+        np.testing.assert_allclose(own.torque(*state), expected, rtol=1e-10, atol=1e-10)
+        assert own.tracking_error == pytest.approx(built_in.tracking_error, rel=1e-9)
+
+
+def test_another_goal_distance_gives_another_torque(
+    panda: Arm, panda_swing: Motion, among_spheres: World
+) -> None:
+    """V = Σ w_i e_i²/2 pulls in proportion to its weights."""
+    stiff, soft = (
+        DensityTracking(
+            among_spheres,
+            panda_swing,
+            goal_distance=TorusDistance(panda, weights=np.full(7, weight), kappa=np.inf),
+        )
+        for weight in (2.0, 1.0)
+    )
+    q = panda.integrate(panda.configuration(panda_swing.position[0]), np.full(7, 0.01))
+    mass, rest = panda.mass_matrix(q), np.zeros(7)
+    held = panda.nonlinear_effects(q, rest)
+    start = panda_swing.sample(0.0, lead=0.5 * panda_swing.period).acceleration
+    parts = [
+        np.linalg.solve(mass, law.torque(0.0, q, rest) - held) - start for law in (stiff, soft)
+    ]
+    np.testing.assert_allclose(parts[0], 2.0 * parts[1], rtol=1e-6)
+
+
+def test_an_own_unsafe_set_acts_where_it_is_sensed(
+    panda: Arm, panda_swing: Motion, among_spheres: World
+) -> None:
+    """Joint 4 is not to open beyond its largest position on the way by more than 0.02 rad."""
+    top = float(panda_swing.position[:, 3].max())
+    fence = ImplicitSet(
+        lambda q: (top + 0.02 - q[3], -np.eye(7)[3]), lambda q: (top + 0.005 - q[3], -np.eye(7)[3])
+    )
+    plain = DensityTracking(among_spheres, panda_swing)
+    fenced = DensityTracking(among_spheres, panda_swing, unsafe_sets=[fence])
+    at = int(panda_swing.position[:, 3].argmax())
+    t, rest = at * panda_swing.period, np.zeros(7)
+    on_the_way = panda.configuration(panda_swing.position[at])
+    beyond = panda.integrate(on_the_way, 0.015 * np.eye(7)[3])
+    np.testing.assert_array_equal(
+        fenced.torque(t, on_the_way, rest), plain.torque(t, on_the_way, rest)
+    )
+    pushed = fenced.torque(t, beyond, rest) - plain.torque(t, beyond, rest)
+    acceleration = np.linalg.solve(panda.mass_matrix(beyond), pushed)
+    assert acceleration[3] < -0.1
+
+
+@pytest.mark.parametrize(
+    ("density", "message"),
+    [
+        (DensityParameters(blend_radius=0.05), r"^density.blend_radius = 0.05: must be 0 in track"),
+        (DensityParameters(gauge=Gauge.LOG), r"^control.form = 'tracking': must be 'regulation'"),
+        (DensityParameters(alpha=2.0), r"with alpha = 2, whose gradient is singular or flat"),
+        (DensityParameters(gauge=Gauge.LOG, blend_radius=0.1), r"^density.blend_radius = 0.1"),
+    ],
+)
+def test_what_tracking_cannot_read_is_refused(
+    swing_up: Scenario, swing_up_motion: Motion, density: DensityParameters, message: str
+) -> None:
+    with pytest.raises(InvalidValueError, match=message):
+        DensityTracking(swing_up.world, swing_up_motion, density=density)
+
+
+def test_it_knows_its_motion_goal_and_error(swing_up: Scenario, swing_up_motion: Motion) -> None:
+    controller = DensityTracking(swing_up.world, swing_up_motion)
+    assert controller.motion is swing_up_motion
+    assert controller.tracking_error == 0.0
+    assert np.abs(swing_up.arm.difference(controller.goal, swing_up.goal)).max() < 1e-9
+    controller.torque(0.0, swing_up.arm.integrate(swing_up.start, np.array([0.1, -0.2])), [0, 0])
+    assert controller.tracking_error == pytest.approx(0.2)

@@ -1,0 +1,121 @@
+"""Timing: rest to rest, within every limit's share, or an error that says why not."""
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from densarm.arms.arm import Arm, load_arm
+from densarm.errors import InvalidValueError
+from densarm.planning.motion import Motion, PlanningError, TimingParameters
+from densarm.planning.smoothing import SmoothPath, smooth_path
+from densarm.planning.timing import time_path
+from densarm.scene.obstacles import Sphere
+from densarm.scene.scene import Scene
+from densarm.values.outcome import Outcome
+from densarm.world.stopping import StoppingCheck, StoppingTrajectory
+from densarm.world.world import World
+
+PERIOD = 0.001  # [s]
+EXCESS = 1.02  # limits hold at grid points; between them the excess is this small
+
+Timed = tuple[Arm, SmoothPath, Motion]
+Bend = tuple[Arm, SmoothPath, StoppingCheck]
+
+
+def free_path(arm: Arm, corners: list[list[float]]) -> SmoothPath:
+    path = smooth_path(World(arm, Scene()), 0.0, arm.configurations(np.array(corners)))
+    assert path is not None
+    return path
+
+
+@pytest.fixture(scope="module", params=["two_link", "panda"])
+def timed(request: pytest.FixtureRequest) -> Timed:
+    arm = load_arm(request.param)
+    corners = {
+        "two_link": [[0.0, 0.0], [1.5, -1.0], [3.1, 0.0]],
+        "panda": [[0.0, -0.8, 0.0, -2.4, 0.0, 1.6, 0.8], [1.0, 0.2, 0.3, -1.5, 0.4, 2.0, 0.0]],
+    }[request.param]
+    path = free_path(arm, corners)
+    return arm, path, time_path(arm, path, 3.0, PERIOD, TimingParameters())
+
+
+def test_from_rest_to_rest_along_the_path(timed: Timed) -> None:
+    _, path, motion = timed
+    np.testing.assert_allclose(motion.position[[0, -1]], path(np.array([0, 1])), atol=1e-12)
+    np.testing.assert_array_equal(motion.velocity[[0, -1]], 0.0)
+    dense = path(np.linspace(0.0, 1.0, 5001))
+    for position in motion.position[::50]:
+        assert np.linalg.norm(dense - position, axis=1).min() < 1e-3
+
+
+def test_velocity_is_the_slope_of_position(timed: Timed) -> None:
+    _, _, motion = timed
+    slope = np.diff(motion.position, axis=0) / PERIOD
+    mean = 0.5 * (motion.velocity[1:] + motion.velocity[:-1])
+    np.testing.assert_allclose(slope, mean, atol=2e-3)
+
+
+def test_limits_hold_at_every_sample(timed: Timed) -> None:
+    arm, _, motion = timed
+    shares, limits = TimingParameters(), arm.limits
+    peak = np.zeros(3)
+    for k in range(len(motion.position)):
+        theta, v, a = motion.sample((k + 0.5) * PERIOD)
+        tau = pin.rnea(arm.model, arm.data, arm.configuration(theta), v, a)
+        ratios = (
+            np.abs(v) / limits.velocity,
+            np.abs(a) / limits.acceleration,
+            abs(tau) / limits.effort,
+        )
+        peak = np.maximum(peak, [ratio.max() for ratio in ratios])
+    allowed = [shares.velocity_share, shares.acceleration_share, shares.torque_share]
+    assert (peak <= EXCESS * np.array(allowed)).all()
+    assert (peak / allowed).max() > 0.95  # no slower than it must be
+
+
+def test_an_arm_too_weak_to_hold_itself(timed: Timed) -> None:
+    arm, path, _ = timed
+    message = r"torque limits allow no motion .* joint '.*' needs .* and has "
+    with pytest.raises(PlanningError, match=message) as raised:
+        time_path(arm, path, 3.0, PERIOD, TimingParameters(torque_share=0.01))
+    assert raised.value.outcome == Outcome.INFEASIBLE
+
+
+@pytest.fixture(scope="module")
+def bend() -> Bend:
+    """A path around a bend, and a ball that it misses but stopping from a fast motion does not."""
+    arm = load_arm("two_link")
+    ball = Scene([Sphere(name="ball", radius=0.1, position=(1.487, 0.0, 1.337))])
+    path = free_path(arm, [[0.0, 0.0], [2.4, 0.0], [2.4, -2.4]])
+    return arm, path, StoppingCheck(World(arm, ball), StoppingTrajectory(arm))
+
+
+def test_slows_down_where_it_could_not_stop_and_only_there(bend: Bend) -> None:
+    arm, path, stopping = bend
+    fast, safe = (
+        time_path(arm, path, 4.8, PERIOD, TimingParameters(), check) for check in (None, stopping)
+    )
+
+    def failing(motion: Motion) -> int:
+        return stopping.check(arm.configurations(motion.position), motion.velocity).failing.size
+
+    assert failing(fast) > 0
+    assert failing(safe) == 0
+    assert fast.duration < safe.duration < 1.3 * fast.duration
+    np.testing.assert_allclose(safe.velocity[:300], fast.velocity[:300], atol=0.05)
+
+
+def test_no_speed_to_stop_from_where_the_path_touches(bend: Bend) -> None:
+    arm, path, _ = bend
+    tip = Scene([Sphere(name="ball", radius=0.1, position=(2.0, 0.0, 0.0))])
+    stopping = StoppingCheck(World(arm, tip), StoppingTrajectory(arm))
+    with pytest.raises(PlanningError, match=r"could stop .* at joint positions \(\d") as raised:
+        time_path(arm, path, 4.8, PERIOD, TimingParameters(), stopping)
+    assert raised.value.outcome == Outcome.INFEASIBLE
+
+
+@pytest.mark.parametrize("key", ["velocity_share", "acceleration_share", "torque_share"])
+@pytest.mark.parametrize("value", [0.0, 1.1, np.nan])
+def test_shares_are_checked(key: str, value: float) -> None:
+    with pytest.raises(InvalidValueError, match=f"^{key} = "):
+        TimingParameters(**{key: value})

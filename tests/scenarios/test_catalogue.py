@@ -1,0 +1,72 @@
+"""What every scenario of the catalogue keeps to."""
+
+from functools import cache
+
+import pytest
+from click.testing import CliRunner
+
+from densarm.arms.catalogue import scenario_paths
+from densarm.cli.list_known import list_known
+from densarm.scenarios.run import run
+from densarm.scenarios.scenario import ControlForm, Scenario, load_scenario
+from densarm.values.outcome import Outcome
+from densarm.world.swept_check import SweptCheck
+
+pytestmark = pytest.mark.slow
+
+loaded = cache(load_scenario)
+
+
+@cache
+def listed() -> dict[str, list[str]]:
+    lines = CliRunner().invoke(list_known, standalone_mode=False).output.splitlines()
+    return {cells[0]: cells[1:] for line in lines if (cells := line.split())}
+
+
+@pytest.fixture(params=scenario_paths())
+def scenario(request: pytest.FixtureRequest) -> Scenario:
+    return loaded(request.param)
+
+
+def test_the_tasks_that_people_are_told_of_are_known() -> None:
+    known = {"three_link_gate", "ur5_bin", "xarm7_posts", "kinova_posts", "z1_window"}
+    panda = {"panda_table", "panda_shelf", "panda_holding_bar"}
+    assert known | panda | {"so100_desk", "swing_up"} <= set(scenario_paths())
+
+
+def test_scenario_has_a_title_obstacles_and_default_control(scenario: Scenario) -> None:
+    assert scenario.title != scenario.name
+    assert len(scenario.scene) > 0
+    assert scenario.control.form == ControlForm.TRACKING
+    assert scenario.control.guide == "path"
+
+
+def test_start_and_goal_are_clear_and_the_straight_segment_is_not(scenario: Scenario) -> None:
+    arm = scenario.arm
+    check = SweptCheck(scenario.world, scenario.control.margin)
+    for q in (scenario.start, scenario.goal):
+        assert check.configuration_is_clear(q)
+        angles = arm.angles(q)
+        assert ((angles >= arm.limits.lower) & (angles <= arm.limits.upper)).all()
+    assert not check.segment_is_clear(scenario.start, scenario.goal)
+
+
+def test_it_is_listed_with_its_robot_joints_and_pairs(scenario: Scenario) -> None:
+    arm = scenario.arm
+    own = len(arm.collision_model.collisionPairs)
+    others = scenario.world.n_pairs - own
+    assert listed()[scenario.name] == [arm.name, *map(str, (arm.nv, own, others))]
+
+
+def test_kinova_goes_the_short_way_round() -> None:
+    scenario = loaded("kinova_posts")
+    arm = scenario.arm
+    step = arm.difference(scenario.start, scenario.goal)
+    assert abs(arm.angles(scenario.start)[0] + step[0]) > 3.15
+    done = run(scenario)
+    assert (done.outcome, done.certified) == (Outcome.REACHED, True), done.detail
+
+
+def test_a_part_is_carried_out_of_a_bin() -> None:
+    done = run(loaded("ur5_bin"))
+    assert (done.outcome, done.certified) == (Outcome.REACHED, True), done.detail

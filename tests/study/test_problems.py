@@ -1,0 +1,106 @@
+"""Problems by the dozen: the same for the same seed, and no run is lost."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from densarm.scenarios.scenario import Scenario
+from densarm.scene.loading import MotionProblem
+from densarm.scene.obstacles import Sphere
+from densarm.scene.scene import Scene
+from densarm.simulation.run import Run
+from densarm.study.problems import (
+    MEASURES,
+    ProblemResult,
+    ProblemResults,
+    motion_time,
+    run_problems,
+    shortest_time,
+)
+from densarm.study.random_problems import random_problems
+from densarm.values.outcome import FAILED, RUN_ENDS
+
+
+@pytest.mark.slow
+def test_several_processes_give_what_one_does() -> None:
+    """In a scene in which each start touches one more of the balls, so that nothing has to run."""
+    balls = [Sphere(name=f"ball{k}", radius=0.1, position=(0.0, 0.0, -0.5 * k)) for k in range(3)]
+    joints = ("shoulder", "elbow")
+    problems = [
+        MotionProblem("two_link", "balls", k, joints, (0.0, 0.0), (3.0, 0.0), {}, Scene(balls[:k]))
+        for k in (1, 2, 3)
+    ]
+    one, two = run_problems(problems), run_problems(problems, jobs=2)
+    assert one == two
+    assert [result.index for result in two.results] == [1, 2, 3]
+    assert one.count("infeasible") == 3
+    assert len({result.detail for result in two.results}) == 3
+
+
+def test_figures_of_runs() -> None:
+    results = run_problems(random_problems("two_link", 2, 0, "none"))
+    assert (results.count("reached"), results.certified, results.total) == (2, 2, 2)
+    data = json.loads(json.dumps(results.to_json(), allow_nan=False))
+    assert (data["reached"], data["certified"], data["total"]) == (2, 2, 2)
+    assert data["outcomes"] == {**dict.fromkeys(RUN_ENDS, 0), "reached": 2}
+    assert {"scene", "index", "outcome", "certified"} <= set(data["problems"][0])
+    assert data["duration_s"] == sorted(data["duration_s"])
+    assert data["motion_s"][0] < data["duration_s"][0]
+    assert data["optimal_ratio"] is None
+    assert set(data["sets"]["empty"]) == set(data) - {"problems", "sets"}
+    assert set(MEASURES) <= set(data)
+
+
+def test_figures_of_a_set_are_of_its_own_problems() -> None:
+    far, near = (
+        ProblemResult(scene, 0, "reached", motion_s=motion, optimal_s=1.0, certified=True)
+        for scene, motion in (("far", 3.0), ("near", 2.0))
+    )
+    results = ProblemResults((far, near))
+    assert results.sets == ("far", "near")
+    assert results.percentiles("optimal_ratio") == pytest.approx([2.5, 2.95, 2.98])
+    assert results.of("near").percentiles("optimal_ratio") == [2.0, 2.0, 2.0]
+    assert results.to_json()["sets"]["far"]["reached"] == 1
+
+
+def test_a_run_that_fails_stops_no_other(monkeypatch: pytest.MonkeyPatch) -> None:
+    def fail(scenario: Scenario) -> Run:
+        raise ArithmeticError(scenario.name)
+
+    monkeypatch.setattr("densarm.study.problems.run_scenario", fail)
+    results = run_problems(random_problems("two_link", 2, 0, "none"))
+    assert results.count(FAILED) == 2
+    assert results.results[1].detail == "two_link_empty_1"
+    assert (results.certified, results.min_clearance, results.percentiles("duration_s")) == (
+        0,
+        None,
+        None,
+    )
+
+
+def test_time_of_a_motion_is_when_the_goal_is_held(swing_up_run: Run) -> None:
+    time = motion_time(swing_up_run)
+    hold = swing_up_run.task.simulation.hold_time
+    assert time == pytest.approx(swing_up_run.time[-1] - hold, abs=0.5 * hold)
+    cut = replace(swing_up_run, time=swing_up_run.time[:50], q=swing_up_run.q[:50])
+    assert motion_time(replace(cut, v=swing_up_run.v[:50])) == np.inf
+    without_goal = replace(swing_up_run, task=replace(swing_up_run.task, goal=None))
+    assert motion_time(without_goal) == np.inf
+
+
+def test_no_motion_is_faster_than_the_time_optimal_one(swing_up_run: Run) -> None:
+    optimal = shortest_time(swing_up_run)
+    assert optimal is not None
+    assert 0.8 * motion_time(swing_up_run) < optimal < motion_time(swing_up_run)
+
+
+def test_time_optimal_motion_of_one_joint_is_that_of_its_limits(swing_up_run: Run) -> None:
+    """The elbow hanging: half of the turn faster and faster, half slower and slower."""
+    arm = swing_up_run.task.arm
+    angles = np.column_stack([np.zeros(200), np.linspace(0.0, 0.3, 200)])
+    turn = replace(swing_up_run, q=arm.configurations(angles))
+    bang_bang = 2.0 * np.sqrt(0.3 / arm.limits.acceleration[1])
+    assert shortest_time(turn) == pytest.approx(bang_bang, rel=0.06)
+    assert shortest_time(replace(turn, q=turn.q[:1])) is None
