@@ -25,6 +25,7 @@ controls = arrays(np.float64, (5, 3), elements=st.floats(-1e6, 1e6, allow_subnor
 clouds = arrays(np.float64, (4, 2), elements=st.floats(-5.0, 5.0))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("field", FIELDS, ids=lambda field: type(field).__name__)
 @given(x=clouds)
 def test_direction_is_parallel_to_the_gradient_of_the_height(

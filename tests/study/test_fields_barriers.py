@@ -80,6 +80,7 @@ def slope(field: BarrierFilter, q: Array) -> Array:
     return out
 
 
+@pytest.mark.slow
 @settings(max_examples=300)
 @given(share=shares)
 def test_keeps_every_barrier_and_the_velocity_limits(

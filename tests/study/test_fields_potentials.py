@@ -74,6 +74,7 @@ def direction(potential: Potential, q: Array) -> Array:
     return potential.velocity(q, None)[0] / RATE
 
 
+@pytest.mark.slow
 @settings(max_examples=60)
 @given(share=shares)
 def test_direction_is_the_gradient(
@@ -98,6 +99,7 @@ def test_direction_is_the_gradient(
     )
 
 
+@pytest.mark.slow
 @given(share=shares)
 def test_ascent_keeps_to_the_direction_and_the_speed_law(
     potential: Potential, within_limits: Callable[..., Array], share: list[float]
