@@ -1,10 +1,8 @@
 """ActivePairs: the pairs of bodies that may be near, the only ones whose distances are queried."""
 
-import warnings
 from dataclasses import dataclass
 from typing import Any, Protocol
 
-import coal
 import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
@@ -13,9 +11,9 @@ from densarm.arms.dynamics import Kinematics
 from densarm.arms.joint_space import joint_error
 from densarm.values.arrays import Array
 from densarm.values.kernels import compiled, compiled_part
-from densarm.world.distance_view import DistanceView
 from densarm.world.lipschitz import sliding_joints
-from densarm.world.world import COAL_TOLERANCE, DISTANCE_TOLERANCE, World
+from densarm.world.pair_queries import PairQueries
+from densarm.world.world import DISTANCE_TOLERANCE, World
 
 _ASLEEP, _AWAKE = 0, 1
 _NEVER = 0  # seen, of a pair that must be queried
@@ -104,9 +102,9 @@ class ActivePairs:
         self._updates_kinematics = kinematics is None
         self.kinematics = kinematics or Kinematics(arm)
         """Placements and Jacobian at the last update."""
-        self._geometry_data = self._precise_data()
-        self._view = DistanceView(self._geometry_data)
-        self.rows: Array = self._view.read()
+        self._queries = PairQueries(arm.model, self._geometry, world.pair_shapes, remembers=False)
+        self._geometry_data = self._queries.data
+        self.rows: Array = self._queries.rows
         """[distance, normal, point 1, point 2] (K, 10) [m]; old where a pair is asleep."""
         # Rows: awake, the version of `World.changes` that was queried, and a workspace.
         self._pair_states = np.array([[_AWAKE], [_NEVER], [0]]).repeat(world.n_pairs, axis=1)
@@ -152,8 +150,7 @@ class ActivePairs:
         if not self.state.any():  # shapes were left where they were
             self._place_shapes(data)
         data.activateCollisionPair(pair)
-        pin.computeDistance(self._geometry, data, pair)
-        self._view.read()
+        self._queries.ask(pair)
         self.state[pair] = _AWAKE
         self.distance[pair] = self.rows[pair, 0]
         return True
@@ -176,29 +173,11 @@ class ActivePairs:
             self.kinematics.update(q)
         if n_awake:
             self._place_shapes(data)
-            pin.computeDistances(self._geometry, data)
-            self._view.read()
+            self._queries.ask_active()
 
     def _place_shapes(self, data: pin.GeometryData) -> None:
         kinematics = self.kinematics
         pin.updateGeometryPlacements(kinematics.model, kinematics.data, self._geometry, data)
-
-    def _precise_data(self) -> pin.GeometryData:
-        """Return geometry data whose queries do not depend on those before, all made once."""
-        geometry = self._geometry
-        data = geometry.createData()
-        for item in geometry.geometryObjects:
-            item.geometry.computeLocalAABB()
-        with warnings.catch_warnings():
-            # Pinocchio asks for guesses from the last query, by a flag that coal calls deprecated.
-            warnings.simplefilter("ignore", DeprecationWarning)
-            for request in data.distanceRequests:
-                request.gjk_tolerance = request.epa_tolerance = COAL_TOLERANCE
-                request.enable_cached_gjk_guess = False
-                request.gjk_initial_guess = coal.GJKInitialGuess.BoundingVolumeGuess
-        self._place_shapes(data)
-        pin.computeDistances(geometry, data)
-        return data
 
 
 @compiled

@@ -52,7 +52,7 @@ class DistanceView:
         rows = np.lib.stride_tricks.as_strided(
             np.ctypeslib.as_array(memory), (len(addresses), _FIELDS), (stride, 8), writeable=False
         )
-        return rows if np.array_equal(rows, self._by_getters()) else None
+        return rows if np.array_equal(rows, self._by_getters(), equal_nan=True) else None
 
     def _by_getters(self) -> Array:
         rows = [

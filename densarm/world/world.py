@@ -13,12 +13,10 @@ from densarm.scene.obstacles import Obstacle, geometry_objects
 from densarm.scene.scene import Scene
 from densarm.values.arrays import Array
 from densarm.values.documented import documented
-from densarm.world.distance_view import DistanceView, add_pair_gradients
+from densarm.world.distance_view import add_pair_gradients
 from densarm.world.lipschitz import joint_support, shape_lipschitz
 from densarm.world.obstacle_slots import ChangingObstacles
-
-COAL_TOLERANCE = 1e-10
-"""GJK and EPA tolerance [m]; at coal's default of 1e-6 gradients err by up to 4e-3."""
+from densarm.world.pair_queries import PairQueries
 
 DISTANCE_TOLERANCE = 1e-7
 """Bound on the error of a computed distance that certificates subtract [m].
@@ -88,11 +86,10 @@ class World(ChangingObstacles):
         pair_shapes = [(pair.first, pair.second) for pair in model.collisionPairs]
         super().__init__(model, np.array(pair_shapes, dtype=np.int64).reshape(-1, 2), reserve)
         self.n_pairs = len(pair_shapes)
-        self._geometry_data, self._data = model.createData(), arm.model.createData()
+        self._queries = PairQueries(arm.model, model, self.pair_shapes, remembers=True)
+        self._geometry_data, self._data = self._queries.data, arm.model.createData()
         # A view that follows the data; Pinocchio drops the second axis of a single column.
         self._jacobian = self._data.J.reshape(6, arm.nv)
-        for request in self._geometry_data.distanceRequests:
-            request.gjk_tolerance = request.epa_tolerance = COAL_TOLERANCE
         shapes = model.geometryObjects
         moves = joint_support(arm.model)[np.array([item.parentJoint for item in shapes], np.int64)]
         first, second = self.pair_shapes.T
@@ -107,10 +104,6 @@ class World(ChangingObstacles):
         r_kj bounds, over all configurations within the position limits, the distance from the axis
         of joint j to any point of the body that it moves; 0 where it moves both bodies or neither.
         """
-        pin.computeDistances(
-            arm.model, self._data, model, self._geometry_data, pin.neutral(arm.model)
-        )
-        self._view = DistanceView(self._geometry_data)
         for obstacle in reserve.obstacles[len(scene) :]:
             self.remove_obstacle(obstacle.name)
         self._is_spare, self._skipped = np.zeros(self.n_pairs, bool), 0
@@ -154,7 +147,7 @@ class World(ChangingObstacles):
         if not np.isfinite(distance).any():
             return None
         k = int(distance.argmin())
-        points = self._view.read()[k, 4:].reshape(2, 3).copy()
+        points = self._queries.rows[k, 4:].reshape(2, 3).copy()
         return NearestPair(float(distance[k]), points, self.pairs[k])
 
     def motion_bound(self, step: Array, pairs: Pairs | None = None) -> Array:
@@ -180,10 +173,10 @@ class World(ChangingObstacles):
         pin.updateGeometryPlacements(self.arm.model, self._data, model, data)
         if pairs is not None and len(pairs) < self.n_pairs:
             for k in pairs.tolist():
-                pin.computeDistance(model, data, k)
-        else:
-            pin.computeDistances(model, data)
-        return self._view.read()
+                self._queries.ask(k)
+        elif not self._is_spare.all():
+            self._queries.ask_active()
+        return self._queries.rows
 
     def _skip_spare_pairs(self) -> None:
         is_spare, self._skipped = self.changes < 0, self.version

@@ -11,7 +11,8 @@ from hypothesis.extra.numpy import arrays
 from densarm.errors import RobotDescriptionError
 from densarm.scene.shapes import box_hull, circumscribed_cylinder, convex_hull, extreme_points
 from densarm.values.arrays import Array
-from densarm.world.world import COAL_TOLERANCE, DISTANCE_TOLERANCE
+from densarm.world.pair_queries import COAL_TOLERANCE
+from densarm.world.world import DISTANCE_TOLERANCE
 
 COORDINATE = st.floats(-2.0, 2.0)
 SIZE = st.floats(0.01, 2.0)

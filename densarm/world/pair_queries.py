@@ -1,0 +1,102 @@
+"""PairQueries: coal's distances of pairs of bodies, asked for again where it has found none."""
+
+import warnings
+
+import coal
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from densarm.scene.shapes import FARTHEST
+from densarm.values.arrays import Array
+from densarm.world.distance_view import DistanceView
+
+COAL_TOLERANCE = 1e-10
+"""GJK and EPA tolerance [m]; at coal's default of 1e-6 gradients err by up to 4e-3."""
+
+_ROUNDING = 1e-14  # tolerance per size of bodies; tighter, at 1e6 m, coal errs by a metre
+_LARGE = 1e3  # [m], size of bodies from which on no guess is remembered
+_LOOSEST = 1e-6  # tolerance [m]
+_FAR = 10.0 * FARTHEST  # [m], beyond all distances that there are
+
+
+class PairQueries:
+    """Distances of the pairs of a geometry model, by coal.
+
+    Where coal cannot be as precise as it is told to be it may say -1.8e308 m, of pairs far apart
+    and of large bodies above all. Such a pair is asked for again, from another guess and at looser
+    tolerances, before anybody reads it.
+
+    Args:
+        model: moves the shapes.
+        geometry: the pairs, all present.
+        pair_shapes: indices of the two shapes of each pair (K, 2).
+        remembers: whether each search begins where the pair's last one ended. The last digits of
+            distances depend on earlier queries then.
+    """
+
+    def __init__(
+        self,
+        model: pin.Model,
+        geometry: pin.GeometryModel,
+        pair_shapes: NDArray[np.int64],
+        remembers: bool,
+    ) -> None:
+        self._geometry = geometry
+        self.data: pin.GeometryData = geometry.createData()
+        """Pinocchio's data, whose placements are to be updated before a query."""
+        size = np.array([_size(item.geometry) for item in geometry.geometryObjects])
+        larger = size[pair_shapes].max(axis=1, initial=0.0)
+        tolerances = np.maximum(COAL_TOLERANCE, _ROUNDING * larger).tolist()
+        self._requests = list(self.data.distanceRequests)
+        for request, tolerance in zip(self._requests, tolerances, strict=True):
+            request.gjk_tolerance = request.epa_tolerance = tolerance
+        for k in np.flatnonzero(larger > _LARGE) if remembers else range(len(larger)):
+            _forget(self._requests[k])
+        pin.computeDistances(model, model.createData(), geometry, self.data, pin.neutral(model))
+        self._view = DistanceView(self.data)
+        self.rows: Array = self._view.read()
+        """[distance, normal, point 1, point 2] (K, 10) [m], each of the pair's last query."""
+        self._ask_again()
+
+    def ask(self, pair: int) -> None:
+        """Query one pair."""
+        pin.computeDistance(self._geometry, self.data, pair)
+        if not abs(self._view.read()[pair, 0]) < _FAR:
+            self._ask_again()
+
+    def ask_active(self) -> None:
+        """Query the active pairs of the data, of which there are some."""
+        nearest = pin.computeDistances(self._geometry, self.data)
+        # What stands for no distance is less than all others.
+        if not self._view.read()[nearest, 0] > -_FAR:
+            self._ask_again()
+
+    def _ask_again(self) -> None:
+        """Replace what is no distance or has no normal."""
+        known = (np.abs(self.rows[:, 0]) < _FAR) & np.isfinite(self.rows).all(axis=1)
+        for k in np.flatnonzero(~known).tolist():
+            request = self._requests[k]
+            own = request.gjk_tolerance
+            _forget(request)
+            for tolerance in np.geomspace(own, max(own, _LOOSEST), 5).tolist():
+                request.gjk_tolerance = request.epa_tolerance = tolerance
+                pin.computeDistance(self._geometry, self.data, k)
+                if np.isfinite(row := self._view.read()[k]).all() and abs(row[0]) < _FAR:
+                    break
+            request.gjk_tolerance = request.epa_tolerance = own
+
+
+def _size(shape: coal.CollisionGeometry) -> float:
+    """Return the radius of a ball around a shape [m]; zero for a half-space, a closed form."""
+    shape.computeLocalAABB()
+    return float(shape.aabb_radius) if np.isfinite(shape.aabb_radius) else 0.0
+
+
+def _forget(request: coal.DistanceRequest) -> None:
+    """Let searches begin in the middle of the bodies."""
+    with warnings.catch_warnings():
+        # Pinocchio asks for guesses from the last query, by a flag that coal calls deprecated.
+        warnings.simplefilter("ignore", DeprecationWarning)
+        request.enable_cached_gjk_guess = False
+        request.gjk_initial_guess = coal.GJKInitialGuess.BoundingVolumeGuess
