@@ -16,6 +16,7 @@ from densarm.certificates.task import (
 )
 from densarm.values.arrays import Array
 from densarm.values.documented import documented
+from densarm.world.smallest_distance import smallest_distances
 from densarm.world.stopping import StoppingCheck, StoppingTrajectory
 from densarm.world.swept_check import SweptCheck, SweptResult, SweptVerdict
 from densarm.world.world import World
@@ -221,7 +222,7 @@ def _stopping(task: Task, world: World, q: Array, v: Array) -> Check:
         return Check("stopping", False, detail, None, first * dt)
     looked_at = np.arange(0, len(q), 1 + len(q) // _RESTS)
     ends = arm.configurations(result.end[looked_at])
-    rest = np.array([world.distances(end).min(initial=np.inf) for end in ends])
+    rest = smallest_distances(world, ends)
     at, longest = float(looked_at[rest.argmin()] * dt), int(np.argmax(result.duration))
     detail = (
         f"proved clear from {len(q)} samples, longest stop {result.duration[longest]:.2g} s at "

@@ -21,6 +21,7 @@ from densarm.values.arrays import Array
 from densarm.values.checks import finite_vector, one_of
 from densarm.values.outcome import Outcome
 from densarm.world.configurations import infeasibility
+from densarm.world.smallest_distance import SmallestDistance
 from densarm.world.swept_check import SweptCheck
 from densarm.world.world import World
 
@@ -116,6 +117,9 @@ class _Loop:
     v: list[Array] = field(default_factory=list)
     clearance: list[float] = field(default_factory=list)
 
+    def __post_init__(self) -> None:
+        self._smallest = SmallestDistance(self.world)
+
     def run(self, on_progress: OnProgress) -> Run:
         task, p = self.task, self.task.simulation
         q, v, inputs = task.start, np.zeros(task.arm.nv), []
@@ -169,13 +173,11 @@ class _Loop:
 
     def _record(self, q: Array, v: Array) -> str:
         """Keep a state; return what touches there, as a phrase."""
-        distance = self.world.distances(q)
+        distance, pair = self._smallest.at(q)
         self.q.append(q.copy())  # as may a plant
         self.v.append(v.copy())
-        self.clearance.append(float(distance.min(initial=np.inf)))
-        if self.clearance[-1] <= 0.0:
-            return " and ".join(self.world.pairs[int(distance.argmin())])
-        return ""
+        self.clearance.append(distance)
+        return " and ".join(self.world.pairs[pair]) if distance <= 0.0 else ""
 
     def _is_at_goal(self, q: Array, v: Array) -> bool:
         if self.task.goal is None or np.abs(v).max() > _HELD_SHARE * REACHED_VELOCITY:

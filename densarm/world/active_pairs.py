@@ -7,6 +7,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
+from densarm.arms.arm import Arm
 from densarm.arms.dynamics import Kinematics
 from densarm.arms.joint_space import joint_error
 from densarm.values.arrays import Array
@@ -115,11 +116,7 @@ class ActivePairs:
         self.reach: Array = self._pair_numbers[0]
         """Distance up to which each pair is awake (K,) [m], which may be changed in place."""
         self._bounds: Array | None = None
-        # Rows: the way gone, its last step, and the least and largest position of slides.
-        self._joint_numbers = np.zeros((4, arm.nv))
-        slides, rest = sliding_joints(arm.model), pin.neutral(arm.model)
-        self._joint_numbers[2] = np.where(slides, arm.limits.lower, -np.inf)
-        self._joint_numbers[3] = np.where(slides, arm.limits.upper, np.inf)
+        self._joint_numbers, rest = joint_numbers(arm), pin.neutral(arm.model)
         self._arrays: tuple[Any, ...] = (
             rest.copy(),
             arm.joint_index,
@@ -180,6 +177,13 @@ class ActivePairs:
         pin.updateGeometryPlacements(kinematics.model, kinematics.data, self._geometry, data)
 
 
+def joint_numbers(arm: Arm) -> Array:
+    """Return rows for `go` (4, nv): zeros, zeros, and the least and largest position of slides."""
+    slides, limits = sliding_joints(arm.model), arm.limits
+    low, high = np.where(slides, limits.lower, -np.inf), np.where(slides, limits.upper, np.inf)
+    return np.array([np.zeros(arm.nv), np.zeros(arm.nv), low, high])
+
+
 @compiled
 def _first(margin: Array, rate: Array) -> tuple[float, int]:
     least, pair = np.inf, -1
@@ -208,7 +212,7 @@ def _wake(
     """
     reach, level = pair_numbers[0], pair_numbers[1]
     state, seen, changed = pair_states[0], pair_states[1], pair_states[2]
-    wakes_all = not _go(q, q_last, joint_index, joint_numbers)
+    wakes_all = not go(q, q_last, joint_index, joint_numbers)
     way, step = joint_numbers[0], joint_numbers[1]
     n_awake, n_changed = 0, 0
     for k in range(state.shape[0]):
@@ -216,9 +220,9 @@ def _wake(
         if change < 0:  # spare
             now, level[k] = _ASLEEP, np.inf
         elif change == seen[k] and not wakes_all:
-            gone = _motion(lipschitz, k, way)
+            gone = pair_motion(lipschitz, k, way)
             if before == _AWAKE:
-                level[k] = rows[k, 0] + (gone - _motion(lipschitz, k, step))
+                level[k] = rows[k, 0] + (gone - pair_motion(lipschitz, k, step))
             # A sleep of a few steps saves nothing, but pairs that close to their reach are few.
             if level[k] - gone > reach[k] + 2.0 * DISTANCE_TOLERANCE:
                 now = _ASLEEP
@@ -231,8 +235,16 @@ def _wake(
 
 
 @compiled_part
-def _go(q: Array, q_last: Array, joint_index: NDArray[np.int64], joint_numbers: Array) -> bool:
-    """Add the last step to the way gone; return whether bounds hold that are older than it."""
+def go(q: Array, q_last: Array, joint_index: NDArray[np.int64], joint_numbers: Array) -> bool:
+    """Add the last step to the way gone; return whether bounds hold that are older than it.
+
+    Args:
+        q: configuration (nq,).
+        q_last: the one before (nq,), overwritten.
+        joint_index: `Arm.joint_index` (2, nv).
+        joint_numbers: the way gone, its last step, both overwritten, and as `joint_numbers` has
+            them the least and largest position of slides (4, nv) [rad or m].
+    """
     way, step, low, high = joint_numbers[0], joint_numbers[1], joint_numbers[2], joint_numbers[3]
     joint_error(q_last, q, joint_index, step)
     holds = True
@@ -252,7 +264,8 @@ def _go(q: Array, q_last: Array, joint_index: NDArray[np.int64], joint_numbers: 
 
 
 @compiled_part
-def _motion(lipschitz: Array, pair: int, way: Array) -> float:
+def pair_motion(lipschitz: Array, pair: int, way: Array) -> float:
+    """Return how far a pair's bodies move against each other at most [m] on a way (nv,)."""
     motion = 0.0
     for j in range(way.shape[0]):
         motion += lipschitz[pair, j] * way[j]

@@ -138,8 +138,8 @@ class World(ChangingObstacles):
         """
         pin.forwardKinematics(self.arm.model, self._data, q)
         rows = self._measured(pairs)
-        distance = np.where(self._is_spare, np.inf, rows[:, 0])
-        return distance if pairs is None else distance[pairs]
+        asked = slice(None) if pairs is None else pairs
+        return np.where(self._is_spare[asked], np.inf, rows[asked, 0])
 
     def nearest(self, q: Array) -> NearestPair | None:
         """Return the nearest two bodies at a configuration (nq,), None without pairs."""
