@@ -16,7 +16,7 @@ from densarm.certificates.task import (
 )
 from densarm.values.arrays import Array
 from densarm.values.documented import documented
-from densarm.world.smallest_distance import smallest_distances
+from densarm.world.near_pairs import smallest_distances
 from densarm.world.stopping import StoppingCheck, StoppingTrajectory
 from densarm.world.swept_check import SweptCheck, SweptResult, SweptVerdict
 from densarm.world.world import World

@@ -34,9 +34,9 @@ from densarm.planning.motion import Motion, write_sample
 from densarm.values.arrays import Array
 from densarm.values.kernels import compiled
 from densarm.world.active_pairs import ActivePairs
+from densarm.world.near_pairs import least_distances
 from densarm.world.stopping import HELD_SHARE
-from densarm.world.swept_check import SweptCheck
-from densarm.world.world import World
+from densarm.world.world import DISTANCE_TOLERANCE, World
 
 _INTERVAL = 0.02  # [s] of the motion between computed distances
 _SMALLEST = 1e-6  # [m or rad], sensing distance where the motion leaves no distance to sense in
@@ -170,11 +170,13 @@ def _sensed_off(
     world: World, motion: Motion, sensing: SensingParameters, kinematics: Kinematics
 ) -> tuple[UnsafeSet, UnsafeSet]:
     """Return pairs and joint limits, sensed nowhere on a motion but where the arm is off it."""
-    arm, check = world.arm, SweptCheck(world, motion.margin)
+    arm = world.arm
     every = max(1, round(_INTERVAL / motion.period))
     angles = np.vstack([motion.position[::every], motion.position[-1:]])
     configurations = arm.configurations(angles)
-    least = np.array([check.distance_margin(q) for q in configurations]).min(axis=0)
+    held = motion.margin + DISTANCE_TOLERANCE
+    limit = held + sensing.distance / sensing.path_share  # beyond which all are sensed alike
+    least = least_distances(world, configurations, limit) - held
     angles = arm.angles(configurations)
     inside = np.minimum(angles - arm.limits.lower, arm.limits.upper - angles).min(axis=0)
     pair_sensing = np.clip(sensing.path_share * least, _SMALLEST, sensing.distance)

@@ -21,7 +21,7 @@ from densarm.values.arrays import Array
 from densarm.values.checks import finite_vector, one_of
 from densarm.values.outcome import Outcome
 from densarm.world.configurations import infeasibility
-from densarm.world.smallest_distance import SmallestDistance
+from densarm.world.near_pairs import NearPairs
 from densarm.world.swept_check import SweptCheck
 from densarm.world.world import World
 
@@ -118,7 +118,7 @@ class _Loop:
     clearance: list[float] = field(default_factory=list)
 
     def __post_init__(self) -> None:
-        self._smallest = SmallestDistance(self.world)
+        self._pairs = NearPairs(self.world)
 
     def run(self, on_progress: OnProgress) -> Run:
         task, p = self.task, self.task.simulation
@@ -173,7 +173,7 @@ class _Loop:
 
     def _record(self, q: Array, v: Array) -> str:
         """Keep a state; return what touches there, as a phrase."""
-        distance, pair = self._smallest.at(q)
+        distance, pair = self._pairs.smallest(q)
         self.q.append(q.copy())  # as may a plant
         self.v.append(v.copy())
         self.clearance.append(distance)

@@ -51,8 +51,8 @@ class PairQueries:
         self._requests = list(self.data.distanceRequests)
         for request, tolerance in zip(self._requests, tolerances, strict=True):
             request.gjk_tolerance = request.epa_tolerance = tolerance
-        for k in np.flatnonzero(larger > _LARGE) if remembers else range(len(larger)):
-            _forget(self._requests[k])
+        forgetful = np.flatnonzero(larger > _LARGE) if remembers else range(len(larger))
+        _forget([self._requests[k] for k in forgetful])
         pin.computeDistances(model, model.createData(), geometry, self.data, pin.neutral(model))
         self._view = DistanceView(self.data)
         self.rows: Array = self._view.read()
@@ -78,7 +78,7 @@ class PairQueries:
         for k in np.flatnonzero(~known).tolist():
             request = self._requests[k]
             own = request.gjk_tolerance
-            _forget(request)
+            _forget([request])
             for tolerance in np.geomspace(own, max(own, _LOOSEST), 5).tolist():
                 request.gjk_tolerance = request.epa_tolerance = tolerance
                 pin.computeDistance(self._geometry, self.data, k)
@@ -93,10 +93,11 @@ def _size(shape: coal.CollisionGeometry) -> float:
     return float(shape.aabb_radius) if np.isfinite(shape.aabb_radius) else 0.0
 
 
-def _forget(request: coal.DistanceRequest) -> None:
+def _forget(requests: list[coal.DistanceRequest]) -> None:
     """Let searches begin in the middle of the bodies."""
     with warnings.catch_warnings():
         # Pinocchio asks for guesses from the last query, by a flag that coal calls deprecated.
         warnings.simplefilter("ignore", DeprecationWarning)
-        request.enable_cached_gjk_guess = False
-        request.gjk_initial_guess = coal.GJKInitialGuess.BoundingVolumeGuess
+        for request in requests:
+            request.enable_cached_gjk_guess = False
+            request.gjk_initial_guess = coal.GJKInitialGuess.BoundingVolumeGuess
