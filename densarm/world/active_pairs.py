@@ -147,7 +147,7 @@ class ActivePairs:
         if not self.state.any():  # shapes were left where they were
             self._place_shapes(data)
         data.activateCollisionPair(pair)
-        self._queries.ask(pair)
+        self._queries.ask(np.array([pair]))
         self.state[pair] = _AWAKE
         self.distance[pair] = self.rows[pair, 0]
         return True

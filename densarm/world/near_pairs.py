@@ -29,48 +29,46 @@ class NearPairs:
         self._smallest = np.inf
         # Rows: after ways of s the distance is at least level - lipschitz @ s; the latter alone.
         self._numbers = np.zeros((2, world.n_pairs))
+        # Rows: which question each pair was asked for last; a workspace.
+        self._asked = np.zeros((2, world.n_pairs), np.int64)
         rest = world.arm.configurations(np.zeros(world.arm.nv))
         index, joints = world.arm.joint_index, joint_numbers(world.arm)
-        self._arrays = rest, index, world.lipschitz, joints, self._numbers
+        self._arrays = rest, index, world.lipschitz, joints, self._numbers, self._asked
+        self._question = 0
 
     def below(self, q: Array, limit: float) -> tuple[Pairs, Array]:
         """Return pairs (P,) and their distances (P,) [m] at q (nq,).
 
         All that are nearer than the limit [m] are among them.
         """
-        return self._ask(q, self._bounds(q) < limit)
+        self._question += 1
+        pairs, rows, _ = self._ask(q, limit)
+        return pairs.copy(), rows[pairs, 0]
 
     def smallest(self, q: Array) -> tuple[float, int]:
         """Return the smallest distance [m] at q (nq,) and the index of the first pair that has it.
 
         Without pairs that is infinity and -1.
         """
-        bound = self._bounds(q)
+        self._question += 1
         limit, nearest = self._smallest + _SLACK, (np.inf, -1)
         while True:
-            asked, distance = self._ask(q, bound < limit)
-            bound[asked] = np.inf
-            if asked.size:
-                k = int(distance.argmin())
-                nearest = min(nearest, (float(distance[k]), int(asked[k])))
+            nearest = min(nearest, self._ask(q, limit)[2])
             if nearest[0] <= limit:
                 self._smallest = nearest[0]
                 return nearest
             limit = nearest[0]
 
-    def _bounds(self, q: Array) -> Array:
-        """Go on to q (nq,), and return what distances are there at least (K,) [m]."""
-        level, gone = self._numbers
-        if self._version != self._world.version:
-            self._version, level[:] = self._world.version, -np.inf
-        _let_go(q, *self._arrays)
-        return np.asarray(level - gone - 2.0 * DISTANCE_TOLERANCE)
-
-    def _ask(self, q: Array, which: NDArray[np.bool_]) -> tuple[Pairs, Array]:
-        asked, (level, gone) = np.flatnonzero(which), self._numbers
-        distance = self._world.distances(q, asked)
-        level[asked] = distance + gone[asked]
-        return asked, distance
+    def _ask(self, q: Array, limit: float) -> tuple[Pairs, Array, tuple[float, int]]:
+        """Ask pairs that may be below a limit [m]; return them, all rows, and the nearest."""
+        world, numbers = self._world, self._numbers
+        if self._version != world.version:
+            self._version = world.version
+            numbers[0] = np.where(world.changes < 0, np.inf, -np.inf)
+        count = _may_be_below(q, limit, self._question, *self._arrays)
+        pairs = self._asked[1, :count]
+        rows = world.query(q, pairs)
+        return pairs, rows, _learn(rows, pairs, numbers)
 
 
 def least_distances(world: World, q: Array, limit: float) -> Array:
@@ -92,17 +90,36 @@ def smallest_distances(world: World, q: Array) -> Array:
 
 
 @compiled
-def _let_go(
+def _may_be_below(
     q: Array,
+    limit: float,
+    question: int,
     q_last: Array,
     joint_index: NDArray[np.int64],
     lipschitz: Array,
     joints: Array,
     numbers: Array,
-) -> None:
-    """Go on to q; write by how much bodies have moved, and forget bounds that no longer hold."""
-    if not go(q, q_last, joint_index, joints):
-        for k in range(numbers.shape[1]):
-            numbers[0, k] = -np.inf
-    for k in range(numbers.shape[1]):
-        numbers[1, k] = pair_motion(lipschitz, k, joints[0])
+    asked: NDArray[np.int64],
+) -> int:
+    """Go on to q; write which pairs have not been asked for a question, and are to be: how many."""
+    level, gone, count = numbers[0], numbers[1], 0
+    holds = go(q, q_last, joint_index, joints)
+    for k in range(level.shape[0]):
+        if not holds and level[k] < np.inf:  # else it is spare
+            level[k] = -np.inf
+        gone[k] = pair_motion(lipschitz, k, joints[0])
+        if asked[0, k] != question and level[k] - gone[k] - 2.0 * DISTANCE_TOLERANCE < limit:
+            asked[0, k], asked[1, count] = question, k
+            count += 1
+    return count
+
+
+@compiled
+def _learn(rows: Array, pairs: Pairs, numbers: Array) -> tuple[float, int]:
+    """Bound distances of pairs from now on; return the smallest and the pair that has it."""
+    smallest, nearest = np.inf, -1
+    for k in pairs:
+        numbers[0, k] = rows[k, 0] + numbers[1, k]
+        if rows[k, 0] < smallest:
+            smallest, nearest = rows[k, 0], k
+    return smallest, nearest

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from densarm.scene.shapes import FARTHEST
 from densarm.values.arrays import Array
+from densarm.values.kernels import compiled
 from densarm.world.distance_view import DistanceView
 
 COAL_TOLERANCE = 1e-10
@@ -59,10 +60,12 @@ class PairQueries:
         """[distance, normal, point 1, point 2] (K, 10) [m], each of the pair's last query."""
         self._ask_again()
 
-    def ask(self, pair: int) -> None:
-        """Query one pair."""
-        pin.computeDistance(self._geometry, self.data, pair)
-        if not abs(self._view.read()[pair, 0]) < _FAR:
+    def ask(self, pairs: NDArray[np.int64]) -> None:
+        """Query some pairs (P,)."""
+        geometry, data = self._geometry, self.data
+        for k in pairs.tolist():
+            pin.computeDistance(geometry, data, k)
+        if not _are_known(self._view.read(), pairs):
             self._ask_again()
 
     def ask_active(self) -> None:
@@ -85,6 +88,14 @@ class PairQueries:
                 if np.isfinite(row := self._view.read()[k]).all() and abs(row[0]) < _FAR:
                     break
             request.gjk_tolerance = request.epa_tolerance = own
+
+
+@compiled
+def _are_known(rows: Array, pairs: NDArray[np.int64]) -> bool:
+    known = True
+    for k in pairs:
+        known &= abs(rows[k, 0]) < _FAR
+    return known
 
 
 def _size(shape: coal.CollisionGeometry) -> float:

@@ -136,10 +136,23 @@ class World(ChangingObstacles):
         Returns:
             Distances (K,), or those of the pairs (P,) [m], in a new array.
         """
-        pin.forwardKinematics(self.arm.model, self._data, q)
-        rows = self._measured(pairs)
+        rows = self.query(q, pairs)
         asked = slice(None) if pairs is None else pairs
         return np.where(self._is_spare[asked], np.inf, rows[asked, 0])
+
+    def query(self, q: Array, pairs: Pairs | None = None) -> Array:
+        """Return what coal tells of pairs, without a copy and without checks.
+
+        Args:
+            q: configuration (nq,).
+            pairs: indices of the pairs to ask for; None for all.
+
+        Returns:
+            Rows [distance, normal from body 1 to 2, nearest point of each] of all pairs (K, 10),
+            new where asked for; the next query overwrites them.
+        """
+        pin.forwardKinematics(self.arm.model, self._data, q)
+        return self._measured(pairs)
 
     def nearest(self, q: Array) -> NearestPair | None:
         """Return the nearest two bodies at a configuration (nq,), None without pairs."""
@@ -172,8 +185,7 @@ class World(ChangingObstacles):
             self._skip_spare_pairs()
         pin.updateGeometryPlacements(self.arm.model, self._data, model, data)
         if pairs is not None and len(pairs) < self.n_pairs:
-            for k in pairs.tolist():
-                self._queries.ask(k)
+            self._queries.ask(pairs)
         elif not self._is_spare.all():
             self._queries.ask_active()
         return self._queries.rows
