@@ -471,9 +471,9 @@ CHANGES = {
     "negative effort": ('effort="20"', 'effort="-20"', "'left' has the effort limit -20"),
     "negative velocity": ('velocity="3"', 'velocity="-3"', "'left' has the velocity limit -3"),
     "two parents": (
-        "</robot>",
-        '<joint name="weld" type="fixed"><parent link="base"/><child link="blade"/></joint>\g<0>',
-        "link 'blade' has two parents, '[a-z_]*' by joint 'wrist' and 'base' by joint 'weld'",
+        "<robot [^>]*>",
+        r'\g<0><joint name="weld" type="fixed"><parent link="base"/><child link="blade"/></joint>',
+        "link 'blade' has two parents, 'base' by joint 'weld' and '[a-z_]*' by joint 'wrist'",
     ),
     "mass not finite": ('mass value="1.0"', 'mass value="inf"', "mass"),
     "no inertia": (r"(?s)<inertial>.*?</inertial>", "", "'wrist' moves no mass.*<inertial>"),

@@ -12,6 +12,7 @@ import pytest
 from densarm.arms.arm import Arm
 from densarm.arms.description import RobotDescription
 from densarm.errors import RobotDescriptionError
+from densarm.values.arrays import Array
 
 DATA = Path(__file__).parents[1] / "data"
 TEXT = (DATA / "branching.urdf").read_text()
@@ -178,25 +179,32 @@ FLAT = {
     '<box size="0.1 0 0"/>': (0.1, 1e-3, 1e-3),
     '<cylinder radius="0.05" length="0"/>': (0.1, 0.1, 1e-3),
     '<cylinder radius="0" length="0.1"/>': (1e-3, 1e-3, 0.1),
-    '<mesh filename="meshes/wedge.stl" scale="1 1 0"/>': None,
 }
+
+
+def points_for(shape: str) -> tuple[Array, tuple[str, ...]]:
+    """Return the corners of the shape in the place of a ball, and what is told of the arm."""
+    arm = arm_of(TEXT.replace('<sphere radius="0.07"/>', shape))
+    item = next(g for g in arm.collision_model.geometryObjects if g.name == "right_arm_0")
+    return np.array(item.geometry.points()), arm.remarks
+
+
+FLAT_REMARK = "collision geometry 'right_arm_0' of link 'right_arm' is flat: 1 mm thick"
 
 
 @pytest.mark.parametrize("shape", FLAT)
 def test_flat_shapes_are_a_millimetre_thick_and_listed(shape: str) -> None:
-    arm = arm_of(TEXT.replace('<sphere radius="0.07"/>', shape))
-    assert arm.remarks == (
-        "collision geometry 'right_arm_0' of link 'right_arm' is flat: 1 mm thick",
-    )
-    item = next(g for g in arm.collision_model.geometryObjects if g.name == "right_arm_0")
-    points = np.array(item.geometry.points())
-    if FLAT[shape] is None:  # a right angle at the origin; it encloses what it stands for
-        whole = arm_of(TEXT.replace('<sphere radius="0.07"/>', shape.replace("1 1 0", "1 1 1")))
-        item = next(g for g in whole.collision_model.geometryObjects if g.name == "right_arm_0")
-        size = np.ptp(np.array(item.geometry.points()), axis=0)
-        np.testing.assert_allclose(np.ptp(points, axis=0), size * [1, 1, 0] + 1e-3, atol=1e-9)
-    else:
-        np.testing.assert_allclose(np.ptp(points, axis=0), FLAT[shape], rtol=2e-3)
+    points, remarks = points_for(shape)
+    np.testing.assert_allclose(np.ptp(points, axis=0), FLAT[shape], rtol=2e-3)
+    assert remarks == (FLAT_REMARK,)
+
+
+def test_flat_meshes_are_enclosed() -> None:
+    mesh = '<mesh filename="meshes/wedge.stl" scale="1 1 {}"/>'
+    (whole, _), (flat, remarks) = points_for(mesh.format(1)), points_for(mesh.format(0))
+    size = np.ptp(whole, axis=0)
+    np.testing.assert_allclose(np.ptp(flat, axis=0), size * [1, 1, 0] + 1e-3, atol=1e-9)
+    assert remarks == (FLAT_REMARK,)
 
 
 def test_a_capsule_without_length_is_a_sphere() -> None:
