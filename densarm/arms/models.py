@@ -171,8 +171,10 @@ def _with_advice(error: RobotDescriptionError, drawn_only: tuple[str, ...]) -> E
 def _require_arm(model: pin.Model, urdf: Urdf) -> None:
     if model.nv == 0:
         raise RobotDescriptionError("the robot has no joint to move")
-    for joint, name in zip(list(model.joints)[1:], list(model.names)[1:], strict=True):
-        reason = _unusable(model, joint) or _immovable(model, joint)
+    joints = list(zip(list(model.joints)[1:], list(model.names)[1:], strict=True))
+    stuck = [name for joint, name in joints if joint.nv == 1 and _range(model, joint) == 0.0]
+    for joint, name in joints:
+        reason = _unusable(model, joint) or _immovable(model, joint, stuck)
         if reason:
             raise RobotDescriptionError(f"joint {name!r} {reason}")
     for joint, inertia in enumerate(model.inertias):
@@ -200,12 +202,18 @@ def _unusable(model: pin.Model, joint: pin.JointModel) -> str:
     return ""
 
 
-def _immovable(model: pin.Model, joint: pin.JointModel) -> str:
+def _range(model: pin.Model, joint: pin.JointModel) -> float:
     low, high = model.lowerPositionLimit[joint.idx_q], model.upperPositionLimit[joint.idx_q]
-    if joint.nq == 2 or low < high:
+    return np.inf if joint.nq == 2 else float(high - low)
+
+
+def _immovable(model: pin.Model, joint: pin.JointModel, stuck: list[str]) -> str:
+    low, high = model.lowerPositionLimit[joint.idx_q], model.upperPositionLimit[joint.idx_q]
+    if _range(model, joint) > 0.0:
         return ""
     if low == high:
-        mend = "widen them, make it continuous, or lock it"
+        listed = ", ".join(f"{name!r}: position" for name in stuck)
+        mend = f"widen them, make it continuous, or lock by locked_joints={{{listed}}}"
         return f"cannot move, as both its limits are {low:g}: {mend}"
     return f"has a lower limit {low:g} above its upper limit {high:g}"
 

@@ -36,6 +36,9 @@ class Urdf:
 
     def __init__(self, description: RobotDescription) -> None:
         self.root = parse_robot_xml(description.urdf, "URDF")
+        self.root.attrib.setdefault("name", description.name)
+        if self.root.find("link") is None:
+            raise RobotDescriptionError("URDF: it has no <link>")
         _require_one_parent(self.root)
         _require_positive_limits(self.root)
         self.remarks = _without_empty_shapes(self.root)
