@@ -19,6 +19,6 @@ def test_every_file_has_a_line(tmp_path: Path, capsys: pytest.CaptureFixture[str
     assert script["main"]([str(tmp_path)]) == 0
     lines = capsys.readouterr().out.splitlines()
     assert lines[2].startswith("| deeper/odd.urdf | loads; collision sphere of link ")
-    assert lines[3] == "| good.urdf | loads | 2 | 0 |"
+    assert lines[3] == "| good.urdf | loads | 2 | 1 |"
     assert lines[4] == "| none.urdf | refused: URDF: it has no <link> |  |  |"
     assert lines[-1] == "Of 3: 2 loads, 1 refused."
