@@ -172,7 +172,7 @@ def _require_arm(model: pin.Model, urdf: Urdf) -> None:
     if model.nv == 0:
         raise RobotDescriptionError("the robot has no joint to move")
     joints = list(zip(list(model.joints)[1:], list(model.names)[1:], strict=True))
-    stuck = [name for joint, name in joints if joint.nv == 1 and _range(model, joint) == 0.0]
+    stuck = [name for joint, name in joints if joint.nq == 1 and len({*_limits(model, joint)}) == 1]
     for joint, name in joints:
         reason = _unusable(model, joint) or _immovable(model, joint, stuck)
         if reason:
@@ -202,14 +202,13 @@ def _unusable(model: pin.Model, joint: pin.JointModel) -> str:
     return ""
 
 
-def _range(model: pin.Model, joint: pin.JointModel) -> float:
-    low, high = model.lowerPositionLimit[joint.idx_q], model.upperPositionLimit[joint.idx_q]
-    return np.inf if joint.nq == 2 else float(high - low)
+def _limits(model: pin.Model, joint: pin.JointModel) -> tuple[float, float]:
+    return model.lowerPositionLimit[joint.idx_q], model.upperPositionLimit[joint.idx_q]
 
 
 def _immovable(model: pin.Model, joint: pin.JointModel, stuck: list[str]) -> str:
-    low, high = model.lowerPositionLimit[joint.idx_q], model.upperPositionLimit[joint.idx_q]
-    if _range(model, joint) > 0.0:
+    low, high = _limits(model, joint)
+    if joint.nq == 2 or low < high:
         return ""
     if low == high:
         listed = ", ".join(f"{name!r}: position" for name in stuck)

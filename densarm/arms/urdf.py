@@ -105,11 +105,8 @@ def _collide_as_drawn(link: ElementTree.Element, which: str) -> None:
 def _require_one_parent(root: ElementTree.Element) -> None:
     parents: dict[str, tuple[str, str]] = {}
     for joint in root.findall("joint"):
-        name, link, parent = (
-            joint.get("name", ""),
-            end_link(joint, "child"),
-            end_link(joint, "parent"),
-        )
+        name, link = joint.get("name", ""), end_link(joint, "child")
+        parent = end_link(joint, "parent")
         if link and link in parents:
             first, other = parents[link]
             raise RobotDescriptionError(
