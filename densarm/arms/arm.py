@@ -58,6 +58,12 @@ class Arm:
 
         They collide as drawn, or not at all if `collision_from_visual` is "never".
         """
+        self.remarks: tuple[str, ...] = models.remarks
+        """What was taken otherwise than URDF and SRDF have it, one phrase each.
+
+        Collision shapes without any size are left out, flat ones made 1 mm thick, and pairs of
+        links that the URDF lacks ignored.
+        """
         self.data = self.model.createData()
         self.nq: int = self.model.nq
         self.nv: int = self.model.nv
@@ -242,7 +248,8 @@ def load_arm(
 ) -> Arm:
     """Load an arm by name or from a URDF file.
 
-    Joints that mimic locked ones are locked with them.
+    Joints that mimic locked ones are locked with them. `Arm.remarks` tells what of the files was
+    not taken as it stands.
 
     Args:
         robot: a known name (``densarm list``), or the path of a URDF.
@@ -263,7 +270,7 @@ def load_arm(
             unless a known robot needs another. `Arm.links_without_collision` names those concerned.
 
     Raises:
-        UnknownNameError: no such robot, joint to move, lock or cut at, or link of the SRDF.
+        UnknownNameError: no such robot, or joint to move, lock or cut at.
         InvalidValueError: a locked position or base placement that is not finite, a locked joint
             that shall be in the arm, or shapes or links to collide as drawn of another name.
         FileContentError: a file that cannot be read.

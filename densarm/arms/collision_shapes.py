@@ -19,6 +19,9 @@ _CAPSULE_TOLERANCE = 1e-4
 # Per size of the body: by which the solver may miss a point, and the capsule exceeds the farthest.
 _TIGHTNESS = 1e-6
 
+_THICKNESS = 1e-3  # [m] of what has none
+_NOTHING = 1e-6  # per longest side, below which a body has no hull
+
 _ROUNDS = 100
 _SMALL = 1e-12  # keeps quotients of zero by zero at zero
 
@@ -46,6 +49,21 @@ def differentiable_geometry(
                 item.placement = item.placement * pose
             result.addGeometryObject(item)
     return result
+
+
+def thicken_flat_shapes(model: pin.Model, geometry: pin.GeometryModel) -> tuple[str, ...]:
+    """Give shapes without thickness, stickers say, 1 mm of it, and return what was done.
+
+    A distance has no gradient inside of what has no inside. Each encloses what it stands for.
+    """
+    remarks = []
+    for item in geometry.geometryObjects:
+        link, shape = model.frames[item.parentFrame].name, item.geometry
+        thick = _thickened(shape, f"collision mesh {item.name!r} of link {link!r}")
+        if thick is not shape:
+            item.geometry = thick
+            remarks.append(f"collision geometry {item.name!r} of link {link!r} is flat: 1 mm thick")
+    return tuple(remarks)
 
 
 def evenly_filled(items: Iterable[pin.GeometryObject], mass: float) -> pin.Inertia:
@@ -113,6 +131,31 @@ def _require_usual_size(item: pin.GeometryObject, link: str) -> None:
         raise RobotDescriptionError(
             f"collision geometry {item.name!r} of link {link!r} has {reason}"
         )
+
+
+def _thickened(shape: coal.CollisionGeometry, name: str) -> coal.CollisionGeometry:
+    """Return a shape, or where it has no thickness one that encloses it and has."""
+    if isinstance(shape, coal.Box):
+        sides = _at_least_thin(2.0 * shape.halfSide)
+        return shape if (sides == 2.0 * shape.halfSide).all() else coal.Box(sides)
+    if isinstance(shape, coal.Cylinder | coal.Capsule):
+        radius, length = shape.radius, 2.0 * shape.halfLength
+        sides = _at_least_thin(np.array([2.0 * radius, length]))
+        same = (sides == [2.0 * radius, length]).all()
+        return shape if same else type(shape)(0.5 * sides[0], sides[1])
+    if isinstance(shape, coal.BVHModelBase):
+        vertices = np.array(shape.vertices())
+        try:
+            convex_hull(vertices, name)
+        except RobotDescriptionError:
+            cube = list(product((-0.5 * _THICKNESS, 0.5 * _THICKNESS), repeat=3))
+            return convex_hull((vertices[:, np.newaxis] + cube).reshape(-1, 3), name)
+    return shape
+
+
+def _at_least_thin(sides: Array) -> Array:
+    """Return sides [m], those that are as nothing beside the longest 1 mm long."""
+    return np.where((sides >= 0.0) & (sides <= _NOTHING * sides.max()), _THICKNESS, sides)
 
 
 def _differentiable_shape(item: pin.GeometryObject, link: str) -> coal.CollisionGeometry:

@@ -6,6 +6,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
+from xml.parsers import expat
 
 from densarm.errors import DensarmError, RobotDescriptionError
 from densarm.scene.scene import Attachment
@@ -109,10 +110,17 @@ def resolve_path(path: str, beside: Path) -> Path:
 
 
 def parse_robot_xml(text: str, kind: str) -> ElementTree.Element:
-    """Return the root ``<robot>`` of a text, whose kind is "URDF" or "SRDF" for errors."""
+    """Return the root ``<robot>`` of a text, whose kind is "URDF" or "SRDF" for errors.
+
+    Prefixes are parts of names and need not be declared: simulators' tags as a rule are not.
+    """
+    builder, parser = ElementTree.TreeBuilder(), expat.ParserCreate()
+    parser.StartElementHandler, parser.EndElementHandler = builder.start, builder.end
+    parser.CharacterDataHandler = builder.data
     try:
-        root = ElementTree.fromstring(text)
-    except ElementTree.ParseError as error:
+        parser.Parse(text, True)
+        root = builder.close()
+    except (expat.ExpatError, ValueError) as error:
         raise RobotDescriptionError(f"{kind}: not well-formed XML ({error})") from None
     if root.tag != "robot":
         raise RobotDescriptionError(f"{kind}: the root element is <{root.tag}>, not <robot>")

@@ -10,13 +10,18 @@ from typing import NamedTuple
 import numpy as np
 import pinocchio as pin
 
-from densarm.arms.collision_shapes import differentiable_geometry, evenly_filled
+from densarm.arms.collision_shapes import (
+    differentiable_geometry,
+    evenly_filled,
+    thicken_flat_shapes,
+)
 from densarm.arms.description import RobotDescription, parse_robot_xml
 from densarm.arms.joints import lock_joints
 from densarm.arms.self_collision import (
     ExcludedPair,
     add_self_collision_pairs,
     remove_always_colliding_pairs,
+    unknown_links,
 )
 from densarm.arms.urdf import Urdf
 from densarm.errors import InvalidValueError, RobotDescriptionError, UnknownNameError
@@ -41,6 +46,8 @@ class RobotModels(NamedTuple):
     """The collision meshes that were read, by their path from the folder that holds them all."""
     links_without_collision: tuple[str, ...]
     """The links that the URDF draws and gives no collision geometry."""
+    remarks: tuple[str, ...]
+    """What was taken otherwise than the URDF and SRDF have it, one phrase each."""
 
 
 class RobotOutline(NamedTuple):
@@ -64,13 +71,14 @@ def build_models(description: RobotDescription) -> RobotModels:
     urdf = Urdf(description)
     try:
         model, collision = _placed_models(description, urdf, pin.GeometryType.COLLISION)
-        _require_arm(model)
+        _require_arm(model, urdf)
         if collision.ngeoms == 0:
             raise RobotDescriptionError(
                 f"robot {description.name!r}: the URDF has no <collision> geometry, so no distance "
                 "can be computed: add shapes or meshes to its links"
             )
         files = _mesh_files(collision)
+        flat = thicken_flat_shapes(model, collision)
         collision = differentiable_geometry(model, collision, description.shapes)
     except RobotDescriptionError as error:
         raise _with_advice(error, urdf.links_without_collision) from None
@@ -82,7 +90,8 @@ def build_models(description: RobotDescription) -> RobotModels:
             items = _attached_shapes(model, attachment)
             inertia = evenly_filled(items, attachment.mass)
             model.appendBodyToJoint(items[0].parentJoint, inertia, pin.SE3.Identity())
-    return RobotModels(model, collision, excluded, files, urdf.links_without_collision)
+    remarks = (*urdf.remarks, *flat, *unknown_links(model, description.srdf))
+    return RobotModels(model, collision, excluded, files, urdf.links_without_collision, remarks)
 
 
 def build_visual_model(description: RobotDescription) -> pin.GeometryModel:
@@ -159,16 +168,24 @@ def _with_advice(error: RobotDescriptionError, drawn_only: tuple[str, ...]) -> E
     return error
 
 
-def _require_arm(model: pin.Model) -> None:
+def _require_arm(model: pin.Model, urdf: Urdf) -> None:
     if model.nv == 0:
         raise RobotDescriptionError("the robot has no joint to move")
-    for joint, name in zip(list(model.joints)[1:], list(model.names)[1:], strict=True):
-        reason = _unusable(model, joint) or _immovable(model, joint)
+    joints = list(zip(list(model.joints)[1:], list(model.names)[1:], strict=True))
+    stuck = [name for joint, name in joints if joint.nq == 1 and len({*_limits(model, joint)}) == 1]
+    for joint, name in joints:
+        reason = _unusable(model, joint) or _immovable(model, joint, stuck)
         if reason:
             raise RobotDescriptionError(f"joint {name!r} {reason}")
-    for name, inertia in zip(model.names, model.inertias, strict=True):
+    for joint, inertia in enumerate(model.inertias):
         if inertia.mass < 0.0:
-            raise RobotDescriptionError(f"the links that joint {name!r} moves have a negative mass")
+            fixed = {frame.name for frame in model.frames if frame.parentJoint == joint}
+            link, mass = min(
+                urdf.masses().items(), key=lambda item: (item[0] not in fixed, item[1])
+            )
+            raise RobotDescriptionError(
+                f"link {link!r} has the negative mass {mass:g}: its <inertial> needs one above zero"
+            )
     _require_inertia(model)
 
 
@@ -185,12 +202,17 @@ def _unusable(model: pin.Model, joint: pin.JointModel) -> str:
     return ""
 
 
-def _immovable(model: pin.Model, joint: pin.JointModel) -> str:
-    low, high = model.lowerPositionLimit[joint.idx_q], model.upperPositionLimit[joint.idx_q]
+def _limits(model: pin.Model, joint: pin.JointModel) -> tuple[float, float]:
+    return model.lowerPositionLimit[joint.idx_q], model.upperPositionLimit[joint.idx_q]
+
+
+def _immovable(model: pin.Model, joint: pin.JointModel, stuck: list[str]) -> str:
+    low, high = _limits(model, joint)
     if joint.nq == 2 or low < high:
         return ""
     if low == high:
-        mend = "widen them, make it continuous, or lock it"
+        listed = ", ".join(f"{name!r}: position" for name in stuck)
+        mend = f"widen them, make it continuous, or lock by locked_joints={{{listed}}}"
         return f"cannot move, as both its limits are {low:g}: {mend}"
     return f"has a lower limit {low:g} above its upper limit {high:g}"
 

@@ -26,6 +26,7 @@ T = TypeVar("T")
 _MESHES = coal.CachedMeshLoader(coal.BV_OBB)
 
 _ELEMENTS = ("collision", "visual")
+_SIZES = ("size", "radius", "length", "scale")
 
 _URDFDOM_MESSAGES = rb"(?:Error|Warning): (?:.*\n)+? +at line \d+ in .*\n"
 
@@ -35,6 +36,13 @@ class Urdf:
 
     def __init__(self, description: RobotDescription) -> None:
         self.root = parse_robot_xml(description.urdf, "URDF")
+        self.root.attrib.setdefault("name", description.name)
+        if self.root.find("link") is None:
+            raise RobotDescriptionError("URDF: it has no <link>")
+        _require_one_parent(self.root)
+        _require_positive_limits(self.root)
+        self.remarks = _without_empty_shapes(self.root)
+        """What it leaves out, one phrase each."""
         drawn = [link for link in self.root.findall("link") if link.find("visual") is not None]
         self.links_without_collision = tuple(
             link.get("name", "") for link in drawn if link.find("collision") is None
@@ -66,8 +74,16 @@ class Urdf:
         )
         for item in geometry.geometryObjects:
             if item.name in self._capsules[element] and isinstance(item.geometry, coal.Cylinder):
-                item.geometry = coal.Capsule(item.geometry.radius, 2.0 * item.geometry.halfLength)
+                radius, length = item.geometry.radius, 2.0 * item.geometry.halfLength
+                item.geometry = coal.Capsule(radius, length) if length else coal.Sphere(radius)
         return geometry
+
+    def masses(self) -> dict[str, float]:
+        """Return the masses [kg] that it gives its links."""
+        given = {link.get("name", ""): link.find("inertial/mass") for link in self.root}
+        return {
+            name: float(mass.get("value", 0)) for name, mass in given.items() if mass is not None
+        }
 
     def _text(self) -> str:
         return ElementTree.tostring(self.root, encoding="unicode")
@@ -84,6 +100,61 @@ def _collide_as_drawn(link: ElementTree.Element, which: str) -> None:
         collision = deepcopy(visual)
         collision.tag = "collision"
         link.append(collision)
+
+
+def _require_one_parent(root: ElementTree.Element) -> None:
+    parents: dict[str, tuple[str, str]] = {}
+    for joint in root.findall("joint"):
+        name, link = joint.get("name", ""), end_link(joint, "child")
+        parent = end_link(joint, "parent")
+        if link and link in parents:
+            first, other = parents[link]
+            raise RobotDescriptionError(
+                f"URDF: link {link!r} has two parents, {first!r} by joint {other!r} and {parent!r} "
+                f"by joint {name!r}: let one joint carry it"
+            )
+        parents[link] = parent, name
+
+
+def _require_positive_limits(root: ElementTree.Element) -> None:
+    """Refuse by the joint's name what the parser refuses without."""
+    for joint in [joint for joint in root.findall("joint") if joint.get("type") != "fixed"]:
+        for limit in joint.findall("limit"):
+            for key in ("effort", "velocity"):
+                if max(_numbers(limit.get(key, "")), default=0.0) < 0.0:
+                    raise RobotDescriptionError(
+                        f"URDF: joint {joint.get('name')!r} has the {key} limit {limit.get(key)}: "
+                        "it must be above zero, or zero for none"
+                    )
+
+
+def _without_empty_shapes(root: ElementTree.Element) -> tuple[str, ...]:
+    """Take out shapes whose every size is zero, and tell of those meant for collision."""
+    remarks = []
+    for link in root.findall("link"):
+        for item in [item for element in _ELEMENTS for item in link.findall(element)]:
+            shapes = [shape for geometry in item.findall("geometry") for shape in geometry]
+            sizes = [_numbers(shape.get(key, "")) for shape in shapes[:1] for key in _SIZES]
+            if any(sizes) and not any(x != 0.0 for numbers in sizes for x in numbers):
+                link.remove(item)
+                if item.tag == "collision":
+                    shape = f"collision {shapes[0].tag} of link {link.get('name')!r}"
+                    remarks.append(f"{shape} has no size: left out")
+    return tuple(remarks)
+
+
+def _numbers(text: str) -> list[float]:
+    """Return the numbers of a text; none where the parser is to say what is wrong with it."""
+    try:
+        return [float(part) for part in text.split()]
+    except ValueError:
+        return []
+
+
+def end_link(joint: ElementTree.Element, kind: str) -> str:
+    """Return the name of a joint's "parent" or "child"."""
+    end = joint.find(kind)
+    return "" if end is None else end.get("link", "")
 
 
 def _rename_capsules(root: ElementTree.Element, element: str) -> set[str]:

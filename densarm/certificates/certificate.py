@@ -174,7 +174,7 @@ def _limits(task: Task, q: Array, v: Array, tau: Array) -> Check:
         "acceleration": np.abs(np.diff(v, axis=0, append=v[-1:])) / dt / limits.acceleration,
         "torque": np.abs(tau) / limits.effort,
     }
-    outside = np.maximum(limits.lower - angles, angles - limits.upper)
+    outside = limits.excess(angles)
     peaks = {name: _peak(ratio) for name, ratio in ratios.items()}
     parts = [
         f"{name} {peak:.0%} ({arm.joint_names[joint]}, t = {at * dt:.3f} s)"

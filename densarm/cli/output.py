@@ -118,6 +118,10 @@ def print_run(run: Run, compiled: float) -> None:
         figures["tracking error"] = f"{run.tracking_error:.2g} rad"
     if run.replanned_at:
         figures["planned again"] = ", ".join(f"at t = {time:.3f} s" for time in run.replanned_at)
+    if run.task.arm.remarks:
+        figures["robot"] = "; ".join(run.task.arm.remarks)
+    if run.base_overlaps:
+        figures["not checked"] = f"{'; '.join(run.base_overlaps)}: neither moves"
     for label, value in figures.items():
         click.echo(f"{label:<{_COLUMN}}{value}")
     click.echo()

@@ -41,6 +41,13 @@ def read_moveit_yaml(path: Path) -> Scene:
         state = _table("robot_state", scene.get("robot_state"))
         if _table("octomap", _table("octomap", world.get("octomap")).get("octomap")).get("data"):
             raise InvalidValueError("world.octomap", "cells", "empty: use meshes or boxes")
+        for key, size, plain in (("link_padding", "padding", 0.0), ("link_scale", "scale", 1.0)):
+            for item in _list(key, scene.get(key)):
+                entry = _table(key, item)
+                value, name = _numbers(key, [entry.get(size, plain)])[0], entry.get("link_name")
+                if value != plain:
+                    allowed = f"{plain:g}: set control.margin, the distance that all links keep"
+                    raise InvalidValueError(f"{key} of {name!r}", value, allowed)
         objects = _list("world.collision_objects", world.get("collision_objects"))
         held = _list("attached_collision_objects", state.get("attached_collision_objects"))
         frames = {_frame(_table("collision object", item)) for item in objects} - {""}

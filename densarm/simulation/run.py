@@ -86,6 +86,11 @@ class Run:
         """What is proved about the run, computed anew from the record when first asked for."""
         return certify(self.task, self.time, self.q, self.v, self.tau)
 
+    @cached_property
+    def base_overlaps(self) -> tuple[str, ...]:
+        """As `World.base_overlaps`: what the certificate, being about motion, is not about."""
+        return World(self.task.arm, self.task.scene).base_overlaps()
+
     @property
     def certified(self) -> bool:
         """Whether the certificate holds in every part."""

@@ -3,6 +3,7 @@
 import json
 import os
 import pty
+import re
 import subprocess
 import sys
 from collections.abc import Callable
@@ -182,3 +183,21 @@ def test_compiling_is_shown_on_a_terminal(scenario_file: Callable[..., Path]) ->
     os.close(theirs)
     os.close(ours)
     assert process.returncode == 0
+
+
+def test_what_was_read_otherwise_and_what_is_not_checked_is_told(
+    command: Command, scenario_file: Callable[..., Path], tmp_path: Path
+) -> None:
+    """A link without size, and a table through the base, in one line each."""
+    urdf = (Path(__file__).parents[1] / "data" / "branching.urdf").read_text(encoding="utf-8")
+    urdf = re.sub(r'<mesh filename="[^"]*"[^>]*/>', '<box size="0.2 0.2 0.2"/>', urdf)
+    urdf = urdf.replace('<sphere radius="0.07"/>', '<sphere radius="0"/>')
+    (tmp_path / "robot.urdf").write_text(urdf, encoding="utf-8")
+    table = 'type = "box"\nname = "table"\nsize = [2.0, 2.0, 0.1]\nposition = [0.0, 0.0, -0.04]'
+    far = "start = [9.0, 0.0, 0.0, 0.0, 0.0]\ngoal = [0.0, 0.0, 0.0, 0.0, 0.0]"
+    path = scenario_file('urdf = "robot.urdf"', far, f"[[obstacles]]\n{table}")
+    done = command("run", path, "--save", tmp_path / "run.npz")
+    assert "collision sphere of link 'right_arm' has no size: left out\n" in done.out
+    assert re.search(r"not checked +'base_0' is in 'table' by \d+ mm: neither moves\n", done.out)
+    (overlap,) = Run.load(tmp_path / "run.npz").base_overlaps
+    assert overlap.startswith("'base_0' is in 'table' by ")
