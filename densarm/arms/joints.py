@@ -34,11 +34,16 @@ class JointLimits:
     acceleration: Array
     """Acceleration limit [rad/s² or m/s²]."""
     effort: Array
-    """Torque or force limit [N·m or N]; infinite as the velocity limit."""
+    """Torque or force limit [N·m or N]; infinite as the velocity limit, and without masses."""
 
 
-def joint_limits(model: pin.Model, acceleration: Vector | None) -> JointLimits:
-    """Return the limits of an arm's joints; None for the default acceleration on every joint."""
+def joint_limits(
+    model: pin.Model, acceleration: Vector | None, *, has_masses: bool = True
+) -> JointLimits:
+    """Return the limits of an arm's joints; None for the default acceleration on every joint.
+
+    Without masses nothing tells what torque a motion takes, so that no torque is limited.
+    """
     if acceleration is None:
         acceleration = (DEFAULT_ACCELERATION,) * model.nv
     given = finite_vector("acceleration", acceleration, model.nv)
@@ -52,7 +57,7 @@ def joint_limits(model: pin.Model, acceleration: Vector | None) -> JointLimits:
         upper=np.where(continuous | (upper >= _UNLIMITED), np.inf, upper),
         velocity=_limit_or_infinity(model.upperVelocityLimit),
         acceleration=given,
-        effort=_limit_or_infinity(model.upperEffortLimit),
+        effort=_limit_or_infinity(has_masses * model.upperEffortLimit),
     )
 
 

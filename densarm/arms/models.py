@@ -13,6 +13,12 @@ import pinocchio as pin
 from densarm.arms.collision_shapes import differentiable_geometry, evenly_filled
 from densarm.arms.description import RobotDescription, parse_robot_xml
 from densarm.arms.joints import lock_joints
+from densarm.arms.masses import (
+    DEFAULT_DENSITY,
+    add_masses,
+    links_without_inertial,
+    needed_masses,
+)
 from densarm.arms.self_collision import (
     ExcludedPair,
     add_self_collision_pairs,
@@ -25,8 +31,6 @@ from densarm.scene.scene import Attachment
 from densarm.scene.shapes import FARTHEST
 from densarm.values.checks import finite_vector, unit_quaternion
 
-_SAMPLES = 5
-_SINGULAR = 1e-10
 _COLOR = np.array([0.36, 0.42, 0.58, 1.0])  # of held bodies; links are as a rule white or grey
 
 
@@ -41,6 +45,8 @@ class RobotModels(NamedTuple):
     """The collision meshes that were read, by their path from the folder that holds them all."""
     links_without_collision: tuple[str, ...]
     """The links that the URDF draws and gives no collision geometry."""
+    links_without_mass: tuple[str, ...]
+    """The links for whose lack of a mass the mass matrix is singular."""
 
 
 class RobotOutline(NamedTuple):
@@ -71,9 +77,14 @@ def build_models(description: RobotDescription) -> RobotModels:
                 "can be computed: add shapes or meshes to its links"
             )
         files = _mesh_files(collision)
-        collision = differentiable_geometry(model, collision, description.shapes)
+        described = collision
+        collision = differentiable_geometry(model, described, description.shapes)
     except RobotDescriptionError as error:
         raise _with_advice(error, urdf.links_without_collision) from None
+    if description.inertia == "from_shapes":
+        lacking = links_without_inertial(urdf.root)
+        add_masses(model, described, lacking, description.density or DEFAULT_DENSITY)
+    needed = needed_masses(model)
     excluded = add_self_collision_pairs(model, collision, description.srdf)
     excluded += remove_always_colliding_pairs(model, collision)
     _attach(model, collision, description.attachments)
@@ -82,7 +93,7 @@ def build_models(description: RobotDescription) -> RobotModels:
             items = _attached_shapes(model, attachment)
             inertia = evenly_filled(items, attachment.mass)
             model.appendBodyToJoint(items[0].parentJoint, inertia, pin.SE3.Identity())
-    return RobotModels(model, collision, excluded, files, urdf.links_without_collision)
+    return RobotModels(model, collision, excluded, files, urdf.links_without_collision, needed)
 
 
 def build_visual_model(description: RobotDescription) -> pin.GeometryModel:
@@ -169,7 +180,6 @@ def _require_arm(model: pin.Model) -> None:
     for name, inertia in zip(model.names, model.inertias, strict=True):
         if inertia.mass < 0.0:
             raise RobotDescriptionError(f"the links that joint {name!r} moves have a negative mass")
-    _require_inertia(model)
 
 
 def _unusable(model: pin.Model, joint: pin.JointModel) -> str:
@@ -193,24 +203,6 @@ def _immovable(model: pin.Model, joint: pin.JointModel) -> str:
         mend = "widen them, make it continuous, or lock it"
         return f"cannot move, as both its limits are {low:g}: {mend}"
     return f"has a lower limit {low:g} above its upper limit {high:g}"
-
-
-def _require_inertia(model: pin.Model) -> None:
-    """Refuse joints that make the mass matrix singular, at rest or at random configurations."""
-    data = model.createData()
-    random = np.random.default_rng(0)
-    for k in range(_SAMPLES):
-        step = np.minimum(k, 1) * random.uniform(-np.pi, np.pi, model.nv)
-        mass = pin.crba(model, data, pin.integrate(model, pin.neutral(model), step))
-        pin.cholesky.decompose(model, data)
-        # The inertia about a joint while the joints after it are free, and while they are held.
-        enough = (_SINGULAR * np.diagonal(mass) < data.D) & np.isfinite(data.D)
-        if not enough.all():
-            name = list(model.names)[1:][int(np.flatnonzero(~enough)[-1])]
-            raise RobotDescriptionError(
-                f"joint {name!r} moves no mass, or an inertia that is not positive, so the mass "
-                "matrix is singular: give its links an <inertial> with their mass, or lock it"
-            )
 
 
 def _attach(
