@@ -46,7 +46,8 @@ class ControlForm(StrEnum):
     PLAIN = "plain"
     """u = ∇ρ + d(q, q̇)."""
     VELOCITY = "velocity"
-    """Along the timed trajectory by commanded velocities, which needs no masses of the arm."""
+    """Along the timed trajectory by commanded velocities, which needs no masses of the arm. Those
+    held for several time steps jump beyond the acceleration limits, which is not certified."""
 
 
 @dataclass(frozen=True)

@@ -51,7 +51,7 @@ def test_reaches_and_is_certified(name: str, form: ControlForm) -> None:
     assert [check for check in done.certificate.checks if not check.holds] == []
 
 
-@pytest.mark.parametrize(("name", "form"), product(SCENARIOS, REGULATIONS))
+@pytest.mark.parametrize(("name", "form"), list(product(SCENARIOS, REGULATIONS)))
 def test_regulation_neither_jolts_nor_chatters(name: str, form: ControlForm) -> None:
     done = run_of(name, form)
     task = done.task

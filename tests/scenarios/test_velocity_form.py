@@ -64,6 +64,7 @@ def test_torque_is_refused_with_both_ways_out(
     assert printed.err.count("\n") == 1
 
 
+@pytest.mark.slow
 def test_velocities_reach_and_are_certified(
     write: Write, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -82,6 +83,7 @@ def test_velocities_reach_and_are_certified(
     assert run(load_scenario(path)).q.tobytes() == done.q.tobytes()
 
 
+@pytest.mark.slow
 def test_masses_from_shapes_let_torque_drive_it(write: Write) -> None:
     done = run(load_scenario(write('inertia = "from_shapes"\ndensity = 2700.0')))
     assert (done.task.input, done.outcome) == (Input.TORQUE, Outcome.REACHED)
