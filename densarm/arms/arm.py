@@ -59,7 +59,7 @@ class Arm:
         They collide as drawn, or not at all if `collision_from_visual` is "never".
         """
         self.links_without_mass: tuple[str, ...] = models.links_without_mass
-        """Links without a mass that joints need. Without it there is no M, and no torque limit."""
+        """Links that joints move without any mass, if M is singular: nothing tells torques then."""
         self.data = self.model.createData()
         self.nq: int = self.model.nq
         self.nv: int = self.model.nv

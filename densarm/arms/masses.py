@@ -44,24 +44,27 @@ def add_masses(
 
 
 def needed_masses(model: pin.Model) -> tuple[str, ...]:
-    """Return the links without whose mass a joint makes the mass matrix singular.
+    """Return the links that joints move without any mass, if the mass matrix is singular for them.
 
-    A joint can move none of its own where those that it carries have some, off its axis.
+    It may be regular where what such a joint carries has a mass, off its axis.
 
     Raises:
         RobotDescriptionError: the mass matrix is singular by an inertia that is not positive.
     """
-    whole, needed = model.copy(), list[str]()
-    while joint := _singular_at(whole):
-        if whole.inertias[joint].toDynamicParameters().any():
-            raise RobotDescriptionError(
-                f"joint {model.names[joint]!r} moves an inertia that is not positive, so the mass "
-                "matrix is singular: mend the <inertial> of its links, or lock it"
-            )
-        links = (frame for frame in model.frames if frame.type == pin.FrameType.BODY)
-        needed.append(next(frame.name for frame in links if frame.parentJoint == joint))
-        whole.inertias[joint] += pin.Inertia(1.0, np.zeros(3), np.eye(3))
-    return tuple(needed)
+    if not _singular_at(model):
+        return ()
+    whole, massless = model.copy(), []
+    for joint in range(1, model.njoints):
+        if not model.inertias[joint].toDynamicParameters().any():
+            whole.inertias[joint] = pin.Inertia(1.0, np.zeros(3), np.eye(3))
+            massless.append(joint)
+    if joint := _singular_at(whole):
+        raise RobotDescriptionError(
+            f"joint {model.names[joint]!r} moves an inertia that is not positive, so the mass "
+            "matrix is singular: mend the <inertial> of its links, or lock it"
+        )
+    links = [frame for frame in model.frames if frame.type == pin.FrameType.BODY]
+    return tuple(next(f.name for f in links if f.parentJoint == joint) for joint in massless)
 
 
 def _singular_at(model: pin.Model) -> int:

@@ -46,7 +46,7 @@ class RobotModels(NamedTuple):
     links_without_collision: tuple[str, ...]
     """The links that the URDF draws and gives no collision geometry."""
     links_without_mass: tuple[str, ...]
-    """The links for whose lack of a mass the mass matrix is singular."""
+    """The links that joints move without any mass, where the mass matrix is singular for them."""
 
 
 class RobotOutline(NamedTuple):
