@@ -66,16 +66,41 @@ def thicken_flat_shapes(model: pin.Model, geometry: pin.GeometryModel) -> tuple[
     return tuple(remarks)
 
 
+def filled_links(
+    model: pin.Model, geometry: pin.GeometryModel, density: float
+) -> dict[int, pin.Inertia]:
+    """Return the inertia of each link's shapes in its joint's frame, by the link's frame.
+
+    Shapes are those that a URDF gives, meshes filled to their hull, of a density [kg/m³].
+    """
+    by_link: dict[int, list[pin.GeometryObject]] = {}
+    for item in geometry.geometryObjects:
+        by_link.setdefault(item.parentFrame, []).append(item)
+    filled = {}
+    for frame, items in by_link.items():
+        solid = _merge_capsules(items)
+        for item in solid:
+            if isinstance(item.geometry, coal.BVHModelBase):
+                item.geometry = _differentiable_shape(item, model.frames[frame].name)
+        filled[frame] = _filled(solid, density)
+    return filled
+
+
 def evenly_filled(items: Iterable[pin.GeometryObject], mass: float) -> pin.Inertia:
     """Return the inertia of a mass [kg] that is spread evenly over the volume of shapes."""
+    total = _filled(items, 1.0)
+    return pin.Inertia(mass, total.lever, mass / total.mass * total.inertia)
+
+
+def _filled(items: Iterable[pin.GeometryObject], density: float) -> pin.Inertia:
     total = pin.Inertia.Zero()
     for item in items:
         shape = item.geometry
         turning = np.array(shape.computeMomentofInertiaRelatedToCOM())
-        symmetric = 0.5 * (turning + turning.T)
-        solid = pin.Inertia(shape.computeVolume(), np.array(shape.computeCOM()), symmetric)
-        total += item.placement.act(solid)
-    return pin.Inertia(mass, total.lever, mass / total.mass * total.inertia)
+        symmetric = 0.5 * density * (turning + turning.T)
+        mass = density * shape.computeVolume()
+        total += item.placement.act(pin.Inertia(mass, np.array(shape.computeCOM()), symmetric))
+    return total
 
 
 class FittedCapsule(NamedTuple):

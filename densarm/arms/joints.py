@@ -38,15 +38,20 @@ class JointLimits:
     acceleration: Array
     """Acceleration limit [rad/s² or m/s²]."""
     effort: Array
-    """Torque or force limit [N·m or N]; infinite as the velocity limit."""
+    """Torque or force limit [N·m or N]; infinite as the velocity limit, and without masses."""
 
     def excess(self, angles: Array) -> Array:
         """Return how far joint positions (..., nv) are outside their limits [rad or m], or < 0."""
         return np.maximum(self.lower - angles, angles - self.upper)
 
 
-def joint_limits(model: pin.Model, acceleration: Vector | None) -> JointLimits:
-    """Return the limits of an arm's joints; None for the default acceleration on every joint."""
+def joint_limits(
+    model: pin.Model, acceleration: Vector | None, *, has_masses: bool = True
+) -> JointLimits:
+    """Return the limits of an arm's joints; None for the default acceleration on every joint.
+
+    Without masses nothing tells what torque a motion takes, so that no torque is limited.
+    """
     if acceleration is None:
         acceleration = (DEFAULT_ACCELERATION,) * model.nv
     given = finite_vector("acceleration", acceleration, model.nv)
@@ -60,7 +65,7 @@ def joint_limits(model: pin.Model, acceleration: Vector | None) -> JointLimits:
         upper=np.where(continuous | (upper >= _UNLIMITED), np.inf, upper),
         velocity=_limit_or_infinity(model.upperVelocityLimit),
         acceleration=given,
-        effort=_limit_or_infinity(model.upperEffortLimit),
+        effort=_limit_or_infinity(has_masses * model.upperEffortLimit),
     )
 
 

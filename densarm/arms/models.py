@@ -17,6 +17,12 @@ from densarm.arms.collision_shapes import (
 )
 from densarm.arms.description import RobotDescription, parse_robot_xml
 from densarm.arms.joints import lock_joints
+from densarm.arms.masses import (
+    DEFAULT_DENSITY,
+    add_masses,
+    links_without_inertial,
+    needed_masses,
+)
 from densarm.arms.self_collision import (
     ExcludedPair,
     add_self_collision_pairs,
@@ -30,8 +36,6 @@ from densarm.scene.scene import Attachment
 from densarm.scene.shapes import FARTHEST
 from densarm.values.checks import finite_vector, unit_quaternion
 
-_SAMPLES = 5
-_SINGULAR = 1e-10
 _COLOR = np.array([0.36, 0.42, 0.58, 1.0])  # of held bodies; links are as a rule white or grey
 
 
@@ -48,6 +52,8 @@ class RobotModels(NamedTuple):
     """The links that the URDF draws and gives no collision geometry."""
     remarks: tuple[str, ...]
     """What was taken otherwise than the URDF and SRDF have it, one phrase each."""
+    links_without_mass: tuple[str, ...]
+    """The links that joints move without any mass, where the mass matrix is singular for them."""
 
 
 class RobotOutline(NamedTuple):
@@ -79,9 +85,14 @@ def build_models(description: RobotDescription) -> RobotModels:
             )
         files = _mesh_files(collision)
         flat = thicken_flat_shapes(model, collision)
-        collision = differentiable_geometry(model, collision, description.shapes)
+        described = collision
+        collision = differentiable_geometry(model, described, description.shapes)
     except RobotDescriptionError as error:
         raise _with_advice(error, urdf.links_without_collision) from None
+    if description.inertia == "from_shapes":
+        lacking = links_without_inertial(urdf.root)
+        add_masses(model, described, lacking, description.density or DEFAULT_DENSITY)
+    needed = needed_masses(model)
     excluded = add_self_collision_pairs(model, collision, description.srdf)
     excluded += remove_always_colliding_pairs(model, collision)
     _attach(model, collision, description.attachments)
@@ -91,7 +102,8 @@ def build_models(description: RobotDescription) -> RobotModels:
             inertia = evenly_filled(items, attachment.mass)
             model.appendBodyToJoint(items[0].parentJoint, inertia, pin.SE3.Identity())
     remarks = (*urdf.remarks, *flat, *unknown_links(model, description.srdf))
-    return RobotModels(model, collision, excluded, files, urdf.links_without_collision, remarks)
+    drawn = urdf.links_without_collision
+    return RobotModels(model, collision, excluded, files, drawn, remarks, needed)
 
 
 def build_visual_model(description: RobotDescription) -> pin.GeometryModel:
@@ -186,7 +198,6 @@ def _require_arm(model: pin.Model, urdf: Urdf) -> None:
             raise RobotDescriptionError(
                 f"link {link!r} has the negative mass {mass:g}: its <inertial> needs one above zero"
             )
-    _require_inertia(model)
 
 
 def _unusable(model: pin.Model, joint: pin.JointModel) -> str:
@@ -215,24 +226,6 @@ def _immovable(model: pin.Model, joint: pin.JointModel, stuck: list[str]) -> str
         mend = f"widen them, make it continuous, or lock by locked_joints={{{listed}}}"
         return f"cannot move, as both its limits are {low:g}: {mend}"
     return f"has a lower limit {low:g} above its upper limit {high:g}"
-
-
-def _require_inertia(model: pin.Model) -> None:
-    """Refuse joints that make the mass matrix singular, at rest or at random configurations."""
-    data = model.createData()
-    random = np.random.default_rng(0)
-    for k in range(_SAMPLES):
-        step = np.minimum(k, 1) * random.uniform(-np.pi, np.pi, model.nv)
-        mass = pin.crba(model, data, pin.integrate(model, pin.neutral(model), step))
-        pin.cholesky.decompose(model, data)
-        # The inertia about a joint while the joints after it are free, and while they are held.
-        enough = (_SINGULAR * np.diagonal(mass) < data.D) & np.isfinite(data.D)
-        if not enough.all():
-            name = list(model.names)[1:][int(np.flatnonzero(~enough)[-1])]
-            raise RobotDescriptionError(
-                f"joint {name!r} moves no mass, or an inertia that is not positive, so the mass "
-                "matrix is singular: give its links an <inertial> with their mass, or lock it"
-            )
 
 
 def _attach(

@@ -104,12 +104,16 @@ def print_run(run: Run, compiled: float) -> None:
     if run.detail:
         click.echo(run.detail)
     click.echo()
-    smallest = float(run.clearance.min())
+    smallest, by_velocity = float(run.clearance.min()), run.task.input == "velocity"
     figures = {
         "duration": f"{run.time[-1]:.3f} s",
         "min clearance": f"{smallest * 1e3:.4g} mm" if math.isfinite(smallest) else "no pairs",
         "goal error": "no goal" if run.task.goal is None else f"{run.goal_error:.2g} rad",
-        "peak torque": f"{run.peak_torque_ratio:.0%} of the limits",
+        "peak torque": (
+            "none, velocities are commanded"
+            if by_velocity
+            else f"{run.peak_torque_ratio:.0%} of the limits"
+        ),
         "planning": f"{run.plan_time:.3f} s, ready after {run.preparation_time:.2f} s",
     }
     if compiled > 0.0:

@@ -11,7 +11,7 @@ from zipfile import BadZipFile, ZipFile, is_zipfile
 import numpy as np
 
 from densarm.certificates.certificate import Certificate, certify
-from densarm.certificates.task import Task
+from densarm.certificates.task import Input, Task
 from densarm.errors import DensarmError, FileContentError
 from densarm.values.arrays import Array
 from densarm.values.documented import documented
@@ -109,12 +109,13 @@ class Run:
     def summary(self) -> dict[str, Any]:
         """Return the run's figures as JSON data; None for what is unknown or infinite."""
         smallest, error = float(self.clearance.min()), self.goal_error
+        by_torque = self.task.input == Input.TORQUE
         return {
             "outcome": str(self.outcome),
             "duration_s": float(self.time[-1]),
             "min_clearance_m": smallest if np.isfinite(smallest) else None,
             "goal_error_rad": error if np.isfinite(error) else None,
-            "peak_torque_ratio": self.peak_torque_ratio,
+            "peak_torque_ratio": self.peak_torque_ratio if by_torque else None,
             "plan_time_s": self.plan_time,
             "preparation_time_s": self.preparation_time,
             "certified": self.certified,

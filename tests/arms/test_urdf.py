@@ -133,15 +133,10 @@ def test_massless_links_between_massive_ones() -> None:
     assert arm_of(re.sub(inertial_of("carriage"), r"\1", TEXT)).nv == 5
 
 
-def test_massless_links_at_the_end() -> None:
-    with pytest.raises(RobotDescriptionError, match=r"joint 'wrist' moves no mass.*<inertial>"):
-        arm_of(re.sub(inertial_of("blade"), r"\1", TEXT))
-
-
 def test_a_point_mass_on_the_axis() -> None:
     point = '<inertial><mass value="1"/><inertia ixx="0" iyy="0" izz="0" ixy="0" ixz="0" iyz="0"/>'
     text = re.sub(inertial_of("blade"), rf"\1{point}</inertial>", TEXT)
-    with pytest.raises(RobotDescriptionError, match=r"joint 'wrist' moves no mass.*singular"):
+    with pytest.raises(RobotDescriptionError, match=r"joint 'wrist' moves an inertia.*singular"):
         arm_of(text)
 
 
