@@ -118,6 +118,9 @@ def print_run(run: Run, compiled: float) -> None:
         figures["tracking error"] = f"{run.tracking_error:.2g} rad"
     if run.replanned_at:
         figures["planned again"] = ", ".join(f"at t = {time:.3f} s" for time in run.replanned_at)
+    if large := run.task.large_meshes:
+        sides = ", ".join(f"{name} {side:.3g} m" for name, side in large.items())
+        figures["large meshes"] = f"{sides}: is their unit right?"
     for label, value in figures.items():
         click.echo(f"{label:<{_COLUMN}}{value}")
     click.echo()
