@@ -69,7 +69,7 @@ class Obstacle(ABC):
         except DensarmError:
             is_usual = False
         if not is_usual:
-            allowed = f"at most {LARGEST:g} m, each above a millionth of the longest"
+            allowed = f"at most {LARGEST:g} m, each above 1 nm and a millionth of the longest"
             raise InvalidValueError(f"{self.name}.{key}", sizes, allowed)
 
     def _store(self, **values: Any) -> None:

@@ -23,6 +23,7 @@ FARTHEST = 1e6
 """No obstacle, shape or joint is placed as far away as this [m]."""
 
 _FLATNESS = 1e-6  # thickness, over the largest coordinate, of points that count as in one plane
+_THINNEST = 1e-9  # [m], likewise of points however near; of 1e-300 m Qhull ends the process
 _CELLS = 64  # along each side of a mesh whose hull is too fine for coal
 _KEPT = 512  # hulls, the last ones asked for
 
@@ -77,7 +78,8 @@ def _hull(content: bytes, name: str) -> coal.ConvexBase:
     if not (np.abs(points) <= LARGEST).all():
         reason = "has vertices that are not finite, or beyond 1 km from its origin"
         raise RobotDescriptionError(f"{name} {reason}: is its unit right?")
-    if len(points) < 4 or _thickness(points) <= _FLATNESS * np.abs(points).max():
+    thinnest = max(_THINNEST, _FLATNESS * np.abs(points).max(initial=0.0))
+    if len(points) < 4 or _thickness(points) <= thinnest:
         raise RobotDescriptionError(f"{name} has no convex hull: its vertices span no volume")
     try:
         return _qhull(points)
