@@ -10,7 +10,13 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from densarm.errors import RobotDescriptionError
-from densarm.scene.shapes import FARTHEST, box_hull, circumscribed_cylinder, convex_hull
+from densarm.scene.shapes import (
+    FARTHEST,
+    LARGEST,
+    box_hull,
+    circumscribed_cylinder,
+    convex_hull,
+)
 from densarm.values.arrays import Array
 
 # [m], agreement of a cylinder's ends with the spheres on them: URDFs write 1.57 for a right angle.
@@ -150,8 +156,10 @@ def _require_usual_size(item: pin.GeometryObject, link: str) -> None:
     sizes = [getattr(shape, key) for key in keys if hasattr(shape, key)]
     numbers = np.hstack([*sizes, item.placement.translation])
     reason = "a size that is not positive" if not (numbers[:-3] > 0.0).all() else ""
-    if not (np.abs(numbers) < FARTHEST).all():
-        reason = "a size or position that is not finite, or beyond 1000 km"
+    if not (np.abs(numbers[:-3]) <= LARGEST).all():
+        reason = "a size that is not finite, or above 1 km"
+    if not (np.abs(item.placement.translation) < FARTHEST).all():
+        reason = "a position that is not finite, or beyond 1000 km"
     if reason:
         raise RobotDescriptionError(
             f"collision geometry {item.name!r} of link {link!r} has {reason}"

@@ -126,6 +126,9 @@ def print_run(run: Run, compiled: float) -> None:
         figures["robot"] = "; ".join(run.task.arm.remarks)
     if run.base_overlaps:
         figures["not checked"] = f"{'; '.join(run.base_overlaps)}: neither moves"
+    if large := run.task.large_meshes:
+        sides = ", ".join(f"{name} {side:.3g} m" for name, side in large.items())
+        figures["large meshes"] = f"{sides}: is their unit right?"
     for label, value in figures.items():
         click.echo(f"{label:<{_COLUMN}}{value}")
     click.echo()

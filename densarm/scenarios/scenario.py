@@ -7,6 +7,8 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from densarm.arms.arm import Arm, load_arm
 from densarm.arms.catalogue import scenario_paths
 from densarm.certificates.task import Input, SimulationParameters, Task
@@ -33,6 +35,7 @@ from densarm.values.checks import (
 from densarm.values.documented import documented
 from densarm.values.files import read_toml
 from densarm.values.tables import parse_table
+from densarm.world.lipschitz import sliding_joints
 from densarm.world.world import World
 
 
@@ -277,5 +280,14 @@ def _configuration(arm: Arm, key: str, value: str | tuple[float, ...]) -> Array:
         if value not in arm.postures:
             raise UnknownNameError(f"posture for {key}", value, arm.postures)
         return arm.postures[value]
-    name = f"{key} (one number per joint, or a posture)"
-    return arm.configuration(finite_vector(name, value, arm.nv))
+    angles = finite_vector(f"{key} (one number per joint, or a posture)", value, arm.nv)
+    limits, turns = arm.limits, sliding_joints(arm.model) == 0.0
+    outside = (angles < limits.lower) | (angles > limits.upper)
+    for joint in np.flatnonzero(outside & turns & (np.abs(angles) > 2.0 * np.pi))[:1]:
+        low, high = limits.lower[joint], limits.upper[joint]
+        allowed = (
+            f"in radians, {low:.4g} to {high:.4g} for {arm.joint_names[joint]!r}, "
+            f"not {angles[joint]:g}: are these degrees?"
+        )
+        raise InvalidValueError(key, value, allowed)
+    return arm.configuration(angles)

@@ -50,12 +50,12 @@ def obj() -> bytes:
     return "\n".join(lines).encode()
 
 
-def dae() -> bytes:
+def dae(meter: float = 1.0) -> bytes:
     numbers = " ".join(map(str, CORNERS.ravel()))
     faces = " ".join(str(k) for face in FACES for k in face)
     return f"""<?xml version="1.0"?>
 <COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema" version="1.4.1">
- <asset><unit name="meter" meter="1"/><up_axis>Z_UP</up_axis></asset>
+ <asset><unit name="it" meter="{meter}"/><up_axis>Z_UP</up_axis></asset>
  <library_geometries><geometry id="g"><mesh>
   <source id="p"><float_array id="a" count="12">{numbers}</float_array><technique_common>
    <accessor source="#a" count="4" stride="3"><param name="X" type="float"/>
@@ -87,6 +87,45 @@ def test_mesh_formats(
     found = np.array(sorted(shape.points().tolist()))
     np.testing.assert_allclose(found, sorted((CORNERS * SCALE).tolist()), atol=1e-7)
     assert capfd.readouterr() == ("", "")
+
+
+def sorted_points(points: Array) -> Array:
+    return np.array(sorted(np.array(points).tolist()))
+
+
+def test_links_collide_and_are_drawn_in_the_unit_of_their_mesh(tmp_path: Path) -> None:
+    (tmp_path / "metres.dae").write_bytes(dae())
+    (tmp_path / "inches.dae").write_bytes(dae(0.0254))
+    (tmp_path / "capitals.stl").write_bytes(ascii_stl().upper())
+    points = {}
+    for name in ("metres.dae", "inches.dae", "capitals.stl"):
+        text = re.sub(r"meshes/wedge\.(stl|obj)", name, TEXT)
+        arm = arm_of(text, tmp_path)
+        points[name] = sorted_points(arm.collision_model.geometryObjects[-1].geometry.points())
+        shape = arm.visual_model.geometryObjects[-1].geometry
+        assert isinstance(shape, coal.BVHModelBase)
+        np.testing.assert_allclose(
+            sorted_points(shape.vertices()) * (1, 1, 2), points[name], atol=1e-8
+        )
+    np.testing.assert_allclose(points["inches.dae"], 0.0254 * points["metres.dae"], atol=1e-8)
+    np.testing.assert_allclose(points["capitals.stl"], points["metres.dae"], atol=1e-7)
+
+
+@pytest.mark.parametrize(
+    ("mesh", "message"),
+    [
+        ('it.ply"', "mesh 'it.ply' of link 'blade': .*it.ply: not a mesh in STL, OBJ or DAE"),
+        ('it.stl" scale="1 1"', "mesh 'it.stl' of link 'blade': scale = '1 1': must be three"),
+        ('it.stl" scale="1 1 a"', "of link 'blade': scale = '1 1 a': must be three finite numbers"),
+        ('it.stl" scale="1 1 1e400"', "of link 'blade': scale = .*finite"),
+    ],
+)
+def test_meshes_that_are_refused(tmp_path: Path, mesh: str, message: str) -> None:
+    for name in ("it.stl", "it.ply"):
+        (tmp_path / name).write_bytes(ascii_stl())
+    text = re.sub(r'meshes/wedge.stl"( scale="[^"]*")?', mesh, TEXT)
+    with pytest.raises(RobotDescriptionError, match=message):
+        arm_of(text, tmp_path)
 
 
 @pytest.mark.parametrize("path", ["package://blades_pkg/it.stl", "model://blades/it.stl", "it.stl"])

@@ -122,6 +122,30 @@ def test_start_in_contact_is_infeasible_and_names_the_pair(
     assert len(Run.load(tmp_path / "run.npz").time) == 1
 
 
+WEDGE = """
+[[obstacles]]
+type = "mesh"
+name = "wedge"
+path = "{path}"
+scale = [{scale}, {scale}, {scale}]
+position = [{x}, -0.05, -1.0]
+"""
+
+
+def test_a_mesh_in_centimetres_is_hit_where_it_is_in_metres(
+    command: Command, scenario_file: Callable[..., Path]
+) -> None:
+    """In metres without its unit its hull begins at the same corner and is 100 times as large."""
+    path = Path(__file__).parents[1] / "data" / "meshes" / "wedge_cm.dae"
+    hit = command("run", scenario_file(rest=WEDGE.format(path=path, scale=1.0, x=-0.05)))
+    assert (hit.status, "infeasible: " in hit.out, "wedge" in hit.out) == (1, True, True)
+    assert "large meshes" not in hit.out
+    past = command("run", scenario_file(rest=WEDGE.format(path=path, scale=1.0, x=0.5)))
+    assert past.status == 0
+    far = command("run", scenario_file(rest=WEDGE.format(path=path, scale=100.0, x=0.5)))
+    assert "large meshes      wedge 30 m: is their unit right?\n" in far.out
+
+
 def test_goal_outside_the_limits_is_infeasible_and_names_the_joint(
     command: Command, scenario_file: Callable[..., Path]
 ) -> None:

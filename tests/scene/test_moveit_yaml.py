@@ -284,3 +284,18 @@ def test_package_paths_are_refused(tmp_path: Path) -> None:
     objects = [{"id": "it", "meshes": [{"resource": "package://a/b.dae"}]}]
     with pytest.raises(FileContentError, match=r"'package://a/b.dae': must be the path of a mesh"):
         read(tmp_path, yaml.safe_dump({"world": {"collision_objects": objects}}))
+
+
+@pytest.mark.parametrize("form", ["{}---\n", "---\n{}---\n", "---\n{}...\n", "{}---\n---\n"])
+def test_one_message_as_ros_prints_it(tmp_path: Path, form: str) -> None:
+    text = "world: {collision_objects: []}\n"
+    assert read(tmp_path, form.format(text)) == Scene()
+    with pytest.raises(FileContentError, match="holds 2 planning scenes, not one"):
+        read(tmp_path, f"{text}---\n{text}---\n")
+
+
+def test_a_flat_mesh_is_refused_by_name(tmp_path: Path) -> None:
+    flat = {"vertices": [[0, 0, 0], [1, 0, 0], [0, 1, 0]], "triangles": []}
+    text = yaml.safe_dump({"world": {"collision_objects": [{"id": "film", "meshes": [flat]}]}})
+    with pytest.raises(FileContentError, match="mesh 'film' has no convex hull"):
+        read(tmp_path, text)
