@@ -10,13 +10,24 @@ from typing import NamedTuple
 import numpy as np
 import pinocchio as pin
 
-from densarm.arms.collision_shapes import differentiable_geometry, evenly_filled
+from densarm.arms.collision_shapes import (
+    differentiable_geometry,
+    evenly_filled,
+    thicken_flat_shapes,
+)
 from densarm.arms.description import RobotDescription, parse_robot_xml
 from densarm.arms.joints import lock_joints
+from densarm.arms.masses import (
+    DEFAULT_DENSITY,
+    add_masses,
+    links_without_inertial,
+    needed_masses,
+)
 from densarm.arms.self_collision import (
     ExcludedPair,
     add_self_collision_pairs,
     remove_always_colliding_pairs,
+    unknown_links,
 )
 from densarm.arms.urdf import Urdf
 from densarm.errors import InvalidValueError, RobotDescriptionError, UnknownNameError
@@ -25,8 +36,6 @@ from densarm.scene.scene import Attachment
 from densarm.scene.shapes import FARTHEST
 from densarm.values.checks import finite_vector, unit_quaternion
 
-_SAMPLES = 5
-_SINGULAR = 1e-10
 _COLOR = np.array([0.36, 0.42, 0.58, 1.0])  # of held bodies; links are as a rule white or grey
 
 
@@ -41,6 +50,10 @@ class RobotModels(NamedTuple):
     """The collision meshes that were read, by their path from the folder that holds them all."""
     links_without_collision: tuple[str, ...]
     """The links that the URDF draws and gives no collision geometry."""
+    remarks: tuple[str, ...]
+    """What was taken otherwise than the URDF and SRDF have it, one phrase each."""
+    links_without_mass: tuple[str, ...]
+    """The links that joints move without any mass, where the mass matrix is singular for them."""
 
 
 class RobotOutline(NamedTuple):
@@ -64,16 +77,22 @@ def build_models(description: RobotDescription) -> RobotModels:
     urdf = Urdf(description)
     try:
         model, collision = _placed_models(description, urdf, pin.GeometryType.COLLISION)
-        _require_arm(model)
+        _require_arm(model, urdf)
         if collision.ngeoms == 0:
             raise RobotDescriptionError(
                 f"robot {description.name!r}: the URDF has no <collision> geometry, so no distance "
                 "can be computed: add shapes or meshes to its links"
             )
         files = _mesh_files(collision)
-        collision = differentiable_geometry(model, collision, description.shapes)
+        flat = thicken_flat_shapes(model, collision)
+        described = collision
+        collision = differentiable_geometry(model, described, description.shapes)
     except RobotDescriptionError as error:
         raise _with_advice(error, urdf.links_without_collision) from None
+    if description.inertia == "from_shapes":
+        lacking = links_without_inertial(urdf.root)
+        add_masses(model, described, lacking, description.density or DEFAULT_DENSITY)
+    needed = needed_masses(model)
     excluded = add_self_collision_pairs(model, collision, description.srdf)
     excluded += remove_always_colliding_pairs(model, collision)
     _attach(model, collision, description.attachments)
@@ -82,7 +101,9 @@ def build_models(description: RobotDescription) -> RobotModels:
             items = _attached_shapes(model, attachment)
             inertia = evenly_filled(items, attachment.mass)
             model.appendBodyToJoint(items[0].parentJoint, inertia, pin.SE3.Identity())
-    return RobotModels(model, collision, excluded, files, urdf.links_without_collision)
+    remarks = (*urdf.remarks, *flat, *unknown_links(model, description.srdf))
+    drawn = urdf.links_without_collision
+    return RobotModels(model, collision, excluded, files, drawn, remarks, needed)
 
 
 def build_visual_model(description: RobotDescription) -> pin.GeometryModel:
@@ -159,17 +180,24 @@ def _with_advice(error: RobotDescriptionError, drawn_only: tuple[str, ...]) -> E
     return error
 
 
-def _require_arm(model: pin.Model) -> None:
+def _require_arm(model: pin.Model, urdf: Urdf) -> None:
     if model.nv == 0:
         raise RobotDescriptionError("the robot has no joint to move")
-    for joint, name in zip(list(model.joints)[1:], list(model.names)[1:], strict=True):
-        reason = _unusable(model, joint) or _immovable(model, joint)
+    joints = list(zip(list(model.joints)[1:], list(model.names)[1:], strict=True))
+    stuck = [name for joint, name in joints if joint.nq == 1 and len({*_limits(model, joint)}) == 1]
+    for joint, name in joints:
+        reason = _unusable(model, joint) or _immovable(model, joint, stuck)
         if reason:
             raise RobotDescriptionError(f"joint {name!r} {reason}")
-    for name, inertia in zip(model.names, model.inertias, strict=True):
+    for joint, inertia in enumerate(model.inertias):
         if inertia.mass < 0.0:
-            raise RobotDescriptionError(f"the links that joint {name!r} moves have a negative mass")
-    _require_inertia(model)
+            fixed = {frame.name for frame in model.frames if frame.parentJoint == joint}
+            link, mass = min(
+                urdf.masses().items(), key=lambda item: (item[0] not in fixed, item[1])
+            )
+            raise RobotDescriptionError(
+                f"link {link!r} has the negative mass {mass:g}: its <inertial> needs one above zero"
+            )
 
 
 def _unusable(model: pin.Model, joint: pin.JointModel) -> str:
@@ -185,32 +213,19 @@ def _unusable(model: pin.Model, joint: pin.JointModel) -> str:
     return ""
 
 
-def _immovable(model: pin.Model, joint: pin.JointModel) -> str:
-    low, high = model.lowerPositionLimit[joint.idx_q], model.upperPositionLimit[joint.idx_q]
+def _limits(model: pin.Model, joint: pin.JointModel) -> tuple[float, float]:
+    return model.lowerPositionLimit[joint.idx_q], model.upperPositionLimit[joint.idx_q]
+
+
+def _immovable(model: pin.Model, joint: pin.JointModel, stuck: list[str]) -> str:
+    low, high = _limits(model, joint)
     if joint.nq == 2 or low < high:
         return ""
     if low == high:
-        mend = "widen them, make it continuous, or lock it"
+        listed = ", ".join(f"{name!r}: position" for name in stuck)
+        mend = f"widen them, make it continuous, or lock by locked_joints={{{listed}}}"
         return f"cannot move, as both its limits are {low:g}: {mend}"
     return f"has a lower limit {low:g} above its upper limit {high:g}"
-
-
-def _require_inertia(model: pin.Model) -> None:
-    """Refuse joints that make the mass matrix singular, at rest or at random configurations."""
-    data = model.createData()
-    random = np.random.default_rng(0)
-    for k in range(_SAMPLES):
-        step = np.minimum(k, 1) * random.uniform(-np.pi, np.pi, model.nv)
-        mass = pin.crba(model, data, pin.integrate(model, pin.neutral(model), step))
-        pin.cholesky.decompose(model, data)
-        # The inertia about a joint while the joints after it are free, and while they are held.
-        enough = (_SINGULAR * np.diagonal(mass) < data.D) & np.isfinite(data.D)
-        if not enough.all():
-            name = list(model.names)[1:][int(np.flatnonzero(~enough)[-1])]
-            raise RobotDescriptionError(
-                f"joint {name!r} moves no mass, or an inertia that is not positive, so the mass "
-                "matrix is singular: give its links an <inertial> with their mass, or lock it"
-            )
 
 
 def _attach(

@@ -8,6 +8,7 @@ from itertools import pairwise
 import numpy as np
 
 from densarm.arms.arm import Arm
+from densarm.arms.joints import POSITION_TOLERANCE
 from densarm.errors import InvalidValueError
 from densarm.planning.guide import FreeSpace, GuidePath, NoPath
 from densarm.values.arrays import Array
@@ -157,12 +158,13 @@ class PathGuide:
         limits = self._arm.limits
         below, above = (ends - limits.lower).min(axis=0), (limits.upper - ends).min(axis=0)
         margin = self._parameters.limit_margin
-        lower = limits.lower + np.minimum(margin, 0.5 * below)
-        return lower, limits.upper - np.minimum(margin, 0.5 * above)
+        # An end may exceed a limit by the tolerance, and is in the bounds all the same.
+        within = [np.minimum(margin, np.minimum(room, 0.5 * room)) for room in (below, above)]
+        return limits.lower + within[0], limits.upper - within[1]
 
     def _fault(self, q: Array) -> str | None:
-        limits, angles = self._arm.limits, self._arm.angles(q)
-        outside = np.flatnonzero((angles < limits.lower) | (angles > limits.upper))
+        excess = self._arm.limits.excess(self._arm.angles(q))
+        outside = np.flatnonzero(excess > POSITION_TOLERANCE)
         if outside.size:
             names = ", ".join(self._arm.joint_names[joint] for joint in outside)
             return f"is outside the position limits of {names}"

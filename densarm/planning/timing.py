@@ -216,21 +216,25 @@ def _bounded(limit: Array) -> Array:
 
 
 def _limits(arm: Arm, path: SmoothPath, grid: Array, parameters: TimingParameters) -> "_Constraint":
-    """Return limits of acceleration and torque, a s̈ + b ṡ² + c, at both ends of all intervals."""
+    """Return limits of acceleration and torque, a s̈ + b ṡ² + c, at both ends of all intervals.
+
+    Torques without a limit, which may exceed what stands for infinity, are not among them.
+    """
     theta, slope, bend = (path(grid, order) for order in range(3))
     q, zero = arm.configurations(theta), np.zeros_like(slope)
     torques = JointTorques(arm)
     held, driven, swung = (
         torques(q, v, a) for v, a in ((zero, zero), (zero, slope), (slope, bend))
     )
+    weak = np.isfinite(arm.limits.effort)
     limit = np.append(
         _bounded(parameters.acceleration_share * arm.limits.acceleration),
-        _bounded(parameters.torque_share * arm.limits.effort),
+        _bounded(parameters.torque_share * arm.limits.effort[weak]),
     )
     coefficients = canlinear_colloc_to_interpolate(
-        np.hstack([slope, driven - held]),
-        np.hstack([bend, swung - held]),
-        np.hstack([zero, held]),
+        np.hstack([slope, (driven - held)[:, weak]]),
+        np.hstack([bend, (swung - held)[:, weak]]),
+        np.hstack([zero, held[:, weak]]),
         np.vstack([np.eye(len(limit)), -np.eye(len(limit))]),
         np.append(limit, limit),
         None,

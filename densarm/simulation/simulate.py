@@ -15,7 +15,7 @@ from densarm.certificates.task import (
 )
 from densarm.control.controller import Controller, VelocityController
 from densarm.errors import InvalidValueError
-from densarm.simulation.plants import PinocchioPlant, Plant
+from densarm.simulation.plants import PinocchioPlant, Plant, SingleIntegrator
 from densarm.simulation.run import Run
 from densarm.values.arrays import Array
 from densarm.values.checks import finite_vector, one_of
@@ -69,6 +69,7 @@ def simulate(
     Raises:
         InvalidValueError: start or goal is not a configuration, a plant of another time step or an
             unknown input, a controller without the method for it, or a torque that is not one.
+        RobotDescriptionError: no plant, and an arm with links without a mass.
     """
     driven = plant or PinocchioPlant(world.arm, parameters.dt, parameters.integrator)
     wanted = getattr(controller, "goal", None) if goal is None else goal
@@ -92,8 +93,13 @@ def simulate_task(
     plant: Plant | None = None,
     on_progress: OnProgress = lambda _: None,
 ) -> Run:
-    """Run a controller on a task; as `simulate`, which makes the task."""
+    """Run a controller on a task; as `simulate`, which makes the task.
+
+    None for a plant is the arm's model, or for a task of velocities the arm that has them.
+    """
     parameters = task.simulation
+    if plant is None and task.input == Input.VELOCITY:
+        plant = SingleIntegrator(world.arm, parameters.dt)
     driven = plant or PinocchioPlant(world.arm, parameters.dt, parameters.integrator)
     if driven.dt != parameters.dt:
         raise InvalidValueError("dt of the plant", driven.dt, f"the loop's, {parameters.dt}")

@@ -2,7 +2,9 @@
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from itertools import product
 
+import coal
 import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
@@ -23,6 +25,8 @@ DISTANCE_TOLERANCE = 1e-7
 
 Above it the largest error measured, between hulls with faces nearly parallel, is 2e-8 m.
 """
+
+_OVERLAP = 5e-3  # [m], above which a base does not just stand on something; UR's meshes go 3 mm in
 
 Pairs = NDArray[np.int64]
 """Indices of pairs (P,)."""
@@ -162,6 +166,27 @@ class World(ChangingObstacles):
         k = int(distance.argmin())
         points = self._queries.rows[k, 4:].reshape(2, 3).copy()
         return NearestPair(float(distance[k]), points, self.pairs[k])
+
+    def base_overlaps(self) -> tuple[str, ...]:
+        """Return which obstacles the arm's base is more than 5 mm inside of, a phrase each.
+
+        That is everything that no joint moves. No distance is computed of it, since none would
+        change: the arm stands in its table, or one of the two is not where it is said to be.
+        """
+        still = [item for item in self.arm.collision_model.geometryObjects if not item.parentJoint]
+        around = [item for slot in self._present.values() for item in slot.shapes]
+        found, request = [], coal.DistanceRequest()
+        request.gjk_tolerance = request.epa_tolerance = COAL_TOLERANCE
+        for bodies in product(still, around):
+            poses = [
+                coal.Transform3s(b.placement.rotation, b.placement.translation) for b in bodies
+            ]
+            first, second = zip((body.geometry for body in bodies), poses, strict=True)
+            depth = -coal.distance(*first, *second, request, coal.DistanceResult())
+            if depth > _OVERLAP:
+                names = " is in ".join(repr(body.name) for body in bodies)
+                found.append(f"{names} by {1e3 * depth:.3g} mm")
+        return tuple(found)
 
     def motion_bound(self, step: Array, pairs: Pairs | None = None) -> Array:
         r"""Return how far the bodies of each pair move against each other at most [m].

@@ -10,6 +10,8 @@ import pytest
 
 from densarm.arms.arm import Arm
 from densarm.arms.free_body import free_body
+from densarm.arms.joints import POSITION_TOLERANCE
+from densarm.control.tracking import DensityTracking
 from densarm.density.goal_distance import TorusDistance
 from densarm.density.navigation_density import DensityParameters
 from densarm.density.sub_goals import GuidedDensity, SubGoals
@@ -23,6 +25,7 @@ from densarm.planning.plan import PATH_MARGIN, PLANNING_ALPHA, plan_motion, plan
 from densarm.scenarios.scenario import Scenario, load_scenario
 from densarm.scene.obstacles import Box, Obstacle, Sphere
 from densarm.scene.scene import Scene
+from densarm.simulation.simulate import simulate
 from densarm.values.arrays import Array
 from densarm.values.outcome import Outcome
 from densarm.world.stopping import StoppingCheck, StoppingTrajectory
@@ -115,8 +118,18 @@ def test_ends_in_contact_and_outside_limits_are_told_at_once(panda: Scenario) ->
     assert error.outcome == Outcome.INFEASIBLE
     assert error.detail.startswith("start: panda_")
     assert " and ball overlap by " in error.detail
-    assert "goal: joint 'panda_joint4' at 0.5 is outside [-3.072, -0.0698]" in error.detail
+    assert "goal: joint 'panda_joint4' at 0.5 is outside [-3.0718, -0.0698]" in error.detail
     assert error.motion is None
+
+
+@pytest.mark.parametrize("guide", ["path", "direct"])
+@pytest.mark.parametrize("backwards", [False, True])
+def test_ends_at_the_limits_may_be_rounded(panda: Scenario, guide: str, backwards: bool) -> None:
+    world, goal = panda.world, panda.goal.copy()
+    goal[0] = panda.arm.limits.upper[0] + 0.9 * POSITION_TOLERANCE
+    start, goal = (goal, panda.start) if backwards else (panda.start, goal)
+    motion = plan_motion(world, start, goal, guide=guide)
+    assert simulate(world, DensityTracking(world, motion), start).certified
 
 
 def test_inside_the_margin_is_infeasible(swing_up: Scenario) -> None:

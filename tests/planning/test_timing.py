@@ -1,10 +1,14 @@
 """Timing: rest to rest, within every limit's share, or an error that says why not."""
 
+import re
+from pathlib import Path
+
 import numpy as np
 import pinocchio as pin
 import pytest
 
 from densarm.arms.arm import Arm, load_arm
+from densarm.arms.description import RobotDescription
 from densarm.errors import InvalidValueError
 from densarm.planning.motion import Motion, PlanningError, TimingParameters
 from densarm.planning.smoothing import SmoothPath, smooth_path
@@ -15,6 +19,7 @@ from densarm.values.outcome import Outcome
 from densarm.world.stopping import StoppingCheck, StoppingTrajectory
 from densarm.world.world import World
 
+GANTRY = Path(__file__).parents[1] / "data" / "gantry.urdf"
 PERIOD = 0.001  # [s]
 EXCESS = 1.02  # limits hold at grid points; between them the excess is this small
 
@@ -79,6 +84,17 @@ def test_an_arm_too_weak_to_hold_itself(timed: Timed) -> None:
     with pytest.raises(PlanningError, match=message) as raised:
         time_path(arm, path, 3.0, PERIOD, TimingParameters(torque_share=0.01))
     assert raised.value.outcome == Outcome.INFEASIBLE
+
+
+def test_what_is_unlimited_may_be_heavy() -> None:
+    """A slide that lifts five tons takes 49 kN, which the solver has no number for."""
+    text = re.sub('effort="[0-9]*"', 'effort="0"', GANTRY.read_text())
+    text = text.replace('<mass value="2"/>', '<mass value="5000"/>')
+    arm = Arm(RobotDescription(name="crane", urdf=text))
+    path = free_path(arm, [[0.0, 0.0, 0.1], [0.5, 0.2, 0.4]])
+    motion = time_path(arm, path, 0.7, PERIOD, TimingParameters())
+    peak = np.abs(np.diff(motion.velocity, axis=0)).max() / PERIOD / arm.limits.acceleration[0]
+    assert 0.8 < peak <= TimingParameters().acceleration_share
 
 
 @pytest.fixture(scope="module")

@@ -73,9 +73,10 @@ CORNERS = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0], [0.3, 0.2, 0.0]]
         (CORNERS[:3] + np.eye(3), "span no volume"),
         (np.vstack([CORNERS, [[0.5, 0.5, 1e-8]]]), "span no volume"),
         (np.zeros((8, 3)), "span no volume"),
+        (1e-320 * np.random.default_rng(0).normal(size=(20, 3)), "span no volume"),
         (np.where(CORNERS == 0.3, np.nan, CORNERS), "not finite"),
         (np.where(CORNERS == 0.3, np.inf, CORNERS), "not finite"),
-        (np.random.default_rng(0).normal(size=(20, 3)) * 1e150, "beyond 1000 km"),
+        (np.random.default_rng(0).normal(size=(20, 3)) * 1e150, "beyond 1 km"),
     ],
 )
 def test_points_without_a_hull_are_refused(points: Array, message: str) -> None:
