@@ -51,6 +51,11 @@ class Arm:
         models = build_models(description)
         self.model, self.collision_model = models.model, models.collision
         self._mesh_files = models.mesh_files
+        self.origin: Array = models.origin
+        """Point of the world that is the origin of the models (3,) [m].
+
+        It is the world's own, or the first joint's place if that is more than 10 m away from it.
+        """
         self.excluded_pairs: tuple[ExcludedPair, ...] = models.excluded_pairs
         """Shapes that are not checked against each other though they move so, and why."""
         self.links_without_collision: tuple[str, ...] = models.links_without_collision

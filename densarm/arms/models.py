@@ -34,8 +34,10 @@ from densarm.errors import InvalidValueError, RobotDescriptionError, UnknownName
 from densarm.scene.obstacles import geometry_objects
 from densarm.scene.scene import Attachment
 from densarm.scene.shapes import FARTHEST
+from densarm.values.arrays import Array
 from densarm.values.checks import finite_vector, unit_quaternion
 
+_NEAR = 10.0  # [m] from the world's origin, up to which models are about that
 _COLOR = np.array([0.36, 0.42, 0.58, 1.0])  # of held bodies; links are as a rule white or grey
 
 
@@ -54,6 +56,12 @@ class RobotModels(NamedTuple):
     """What was taken otherwise than the URDF and SRDF have it, one phrase each."""
     links_without_mass: tuple[str, ...]
     """The links that joints move without any mass, where the mass matrix is singular for them."""
+    origin: Array
+    """The point of the world about which they are (3,) [m].
+
+    It is that of the first joint, if that is far from the world's own: dynamics about a point 1 km
+    off lose six digits, and about one 500 km off all of them.
+    """
 
 
 class RobotOutline(NamedTuple):
@@ -76,7 +84,7 @@ def build_models(description: RobotDescription) -> RobotModels:
     """Build Pinocchio's model and collision geometry of an arm."""
     urdf = Urdf(description)
     try:
-        model, collision = _placed_models(description, urdf, pin.GeometryType.COLLISION)
+        model, collision, origin = _placed_models(description, urdf, pin.GeometryType.COLLISION)
         _require_arm(model, urdf)
         if collision.ngeoms == 0:
             raise RobotDescriptionError(
@@ -103,12 +111,12 @@ def build_models(description: RobotDescription) -> RobotModels:
             model.appendBodyToJoint(items[0].parentJoint, inertia, pin.SE3.Identity())
     remarks = (*urdf.remarks, *flat, *unknown_links(model, description.srdf))
     drawn = urdf.links_without_collision
-    return RobotModels(model, collision, excluded, files, drawn, remarks, needed)
+    return RobotModels(model, collision, excluded, files, drawn, remarks, needed, origin)
 
 
 def build_visual_model(description: RobotDescription) -> pin.GeometryModel:
     """Build Pinocchio's visual geometry, whose meshes take most of an arm's loading time."""
-    model, visual = _placed_models(description, Urdf(description), pin.GeometryType.VISUAL)
+    model, visual, _ = _placed_models(description, Urdf(description), pin.GeometryType.VISUAL)
     _attach(model, visual, description.attachments)
     return visual
 
@@ -120,7 +128,7 @@ def robot_outline(description: RobotDescription) -> RobotOutline:
         mesh.tag = "box"
         mesh.attrib = {"size": "1 1 1"}
     description = replace(description, urdf=ElementTree.tostring(root, encoding="unicode"))
-    model, geometry = _placed_models(description, Urdf(description), pin.GeometryType.COLLISION)
+    model, geometry, _ = _placed_models(description, Urdf(description), pin.GeometryType.COLLISION)
     geometry = differentiable_geometry(model, geometry)
     excluded = add_self_collision_pairs(model, geometry, description.srdf)
     _attach(model, geometry, description.attachments)
@@ -142,13 +150,17 @@ def end_effector_frame(model: pin.Model, name: str | None) -> int:
 
 def _placed_models(
     description: RobotDescription, urdf: Urdf, kind: pin.GeometryType
-) -> tuple[pin.Model, pin.GeometryModel]:
-    """Return the model without locked joints and the geometry as the URDF has it, on their base."""
+) -> tuple[pin.Model, pin.GeometryModel, Array]:
+    """Return the model without locked joints, the geometry as the URDF has it, and their origin."""
     model, geometry = lock_joints(urdf, urdf.geometry(kind), description.locked_joints)
     placement = finite_vector("base_placement", description.base_placement, 7)
     placement[3:] = unit_quaternion("base_placement orientation", placement[3:])
-    _place_base(model, geometry, pin.XYZQUATToSE3(placement))
-    return model, geometry
+    base = pin.XYZQUATToSE3(placement)
+    first = base.act(model.jointPlacements[1].translation) if model.njoints > 1 else np.zeros(3)
+    origin = first if _NEAR < np.linalg.norm(first) < FARTHEST else np.zeros(3)
+    base.translation -= origin
+    _place_base(model, geometry, base)
+    return model, geometry, origin
 
 
 def _place_base(model: pin.Model, geometry: pin.GeometryModel, base: pin.SE3) -> None:

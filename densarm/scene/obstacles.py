@@ -8,6 +8,7 @@ from typing import Any, ClassVar
 import coal
 import numpy as np
 import pinocchio as pin
+from numpy.typing import ArrayLike
 
 from densarm.errors import DensarmError, InvalidValueError
 from densarm.scene.shapes import FARTHEST, LARGEST, box_hull, circumscribed_cylinder
@@ -184,20 +185,27 @@ class HalfSpace(Obstacle):
         return (coal.Halfspace(np.array(self.normal), self.offset),)
 
 
-def obstacle_pose(obstacle: Obstacle) -> pin.SE3:
-    """Return the pose of an obstacle's frame."""
-    return pin.XYZQUATToSE3(np.array([*obstacle.position, *obstacle.orientation_xyzw]))
+def obstacle_pose(obstacle: Obstacle, origin: ArrayLike = (0.0, 0.0, 0.0)) -> pin.SE3:
+    """Return the pose of an obstacle's frame, seen from a point of the world (3,) [m]."""
+    position = np.subtract(obstacle.position, origin)
+    return pin.XYZQUATToSE3(np.array([*position, *obstacle.orientation_xyzw]))
 
 
 def geometry_objects(
-    obstacle: Obstacle, joint: int = 0, frame: int = 0, placement: pin.SE3 | None = None
+    obstacle: Obstacle,
+    joint: int = 0,
+    frame: int = 0,
+    placement: pin.SE3 | None = None,
+    origin: ArrayLike = (0.0, 0.0, 0.0),
 ) -> list[pin.GeometryObject]:
     """Return an obstacle's convex shapes as Pinocchio's geometry objects.
 
-    A frame holds them, by its index and its placement against a joint; none if in the world.
+    A frame holds them, by its index and its placement against a joint; none if in the world, where
+    they are seen from a point (3,) [m].
     """
     shapes = obstacle.convex_shapes()
-    pose = obstacle_pose(obstacle) if placement is None else placement * obstacle_pose(obstacle)
+    pose = obstacle_pose(obstacle, origin)
+    pose = pose if placement is None else placement * pose
     return [
         pin.GeometryObject(name, joint, frame, pose, shape)
         for name, shape in zip(numbered(obstacle.name, len(shapes)), shapes, strict=True)

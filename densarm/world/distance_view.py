@@ -48,8 +48,8 @@ class DistanceView:
             return None
         first, some = self._address(0), np.unique(np.linspace(0, count - 1, _COMPARED).astype(int))
         stride = self._address(1) - first if count > 1 else _FIELDS * 8
-        steps = [self._address(k) - first for k in some]
-        if (steps != stride * some).any() or stride < _FIELDS * 8 or stride % 8 != 0:
+        even = all(self._address(k) - first == stride * k for k in some)
+        if not even or stride < _FIELDS * 8 or stride % 8 != 0:
             return None
         size = (stride // 8) * (count - 1) + _FIELDS
         memory = (ctypes.c_double * size).from_address(first - 8)

@@ -15,8 +15,7 @@ from densarm.world.distance_view import DistanceView
 COAL_TOLERANCE = 1e-10
 """GJK and EPA tolerance [m]; at coal's default of 1e-6 gradients err by up to 4e-3."""
 
-_ROUNDING = 1e-14  # tolerance per size of bodies; tighter, at 1e6 m, coal errs by a metre
-_LARGE = 1e3  # [m], size of bodies from which on no guess is remembered
+_LARGE = 10.0  # [m], radius of bodies of which a remembered guess may end at a wrong distance
 _LOOSEST = 1e-6  # tolerance [m]
 _FAR = 10.0 * FARTHEST  # [m], beyond all distances that there are
 
@@ -24,16 +23,16 @@ _FAR = 10.0 * FARTHEST  # [m], beyond all distances that there are
 class PairQueries:
     """Distances of the pairs of a geometry model, by coal.
 
-    Where coal cannot be as precise as it is told to be it may say -1.8e308 m, of pairs far apart
-    and of large bodies above all. Such a pair is asked for again, from another guess and at looser
+    Where coal cannot be as precise as it is told to be it may say -1.8e308 m, mostly
+    of pairs far apart. Such a pair is asked for again, from another guess and at looser
     tolerances, before anybody reads it.
 
     Args:
         model: moves the shapes.
         geometry: the pairs, all present.
         pair_shapes: indices of the two shapes of each pair (K, 2).
-        remembers: whether each search begins where the pair's last one ended. The last digits of
-            distances depend on earlier queries then.
+        remembers: whether each search begins where the pair's last one ended, unless a body is
+            large. The last digits of distances depend on earlier queries then.
     """
 
     def __init__(
@@ -46,14 +45,15 @@ class PairQueries:
         self._geometry = geometry
         self.data: pin.GeometryData = geometry.createData()
         """Pinocchio's data, whose placements are to be updated before a query."""
-        size = np.array([_size(item.geometry) for item in geometry.geometryObjects])
-        larger = size[pair_shapes].max(axis=1, initial=0.0)
-        tolerances = np.maximum(COAL_TOLERANCE, _ROUNDING * larger).tolist()
+        shapes = [item.geometry for item in geometry.geometryObjects]
+        for shape in shapes:
+            shape.computeLocalAABB()
+        radius = np.array([shape.aabb_radius for shape in shapes])
+        forgets = (radius[pair_shapes] > _LARGE).any(axis=1) | (not remembers)
         self._requests = list(self.data.distanceRequests)
-        for request, tolerance in zip(self._requests, tolerances, strict=True):
-            request.gjk_tolerance = request.epa_tolerance = tolerance
-        forgetful = np.flatnonzero(larger > _LARGE) if remembers else range(len(larger))
-        _forget([self._requests[k] for k in forgetful])
+        for request in self._requests:
+            request.gjk_tolerance = request.epa_tolerance = COAL_TOLERANCE
+        _forget([self._requests[k] for k in np.flatnonzero(forgets)])
         pin.computeDistances(model, model.createData(), geometry, self.data, pin.neutral(model))
         self._view = DistanceView(self.data)
         self.rows: Array = self._view.read()
@@ -80,14 +80,13 @@ class PairQueries:
         known = (np.abs(self.rows[:, 0]) < _FAR) & np.isfinite(self.rows).all(axis=1)
         for k in np.flatnonzero(~known).tolist():
             request = self._requests[k]
-            own = request.gjk_tolerance
             _forget([request])
-            for tolerance in np.geomspace(own, max(own, _LOOSEST), 5).tolist():
+            for tolerance in np.geomspace(COAL_TOLERANCE, _LOOSEST, 5).tolist():
                 request.gjk_tolerance = request.epa_tolerance = tolerance
                 pin.computeDistance(self._geometry, self.data, k)
                 if np.isfinite(row := self._view.read()[k]).all() and abs(row[0]) < _FAR:
                     break
-            request.gjk_tolerance = request.epa_tolerance = own
+            request.gjk_tolerance = request.epa_tolerance = COAL_TOLERANCE
 
 
 @compiled
@@ -96,12 +95,6 @@ def _are_known(rows: Array, pairs: NDArray[np.int64]) -> bool:
     for k in pairs:
         known &= abs(rows[k, 0]) < _FAR
     return known
-
-
-def _size(shape: coal.CollisionGeometry) -> float:
-    """Return the radius of a ball around a shape [m]; zero for a half-space, a closed form."""
-    shape.computeLocalAABB()
-    return float(shape.aabb_radius) if np.isfinite(shape.aabb_radius) else 0.0
 
 
 def _forget(requests: list[coal.DistanceRequest]) -> None:

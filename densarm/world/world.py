@@ -18,7 +18,7 @@ from densarm.values.documented import documented
 from densarm.world.distance_view import add_pair_gradients
 from densarm.world.lipschitz import joint_support, shape_lipschitz
 from densarm.world.obstacle_slots import ChangingObstacles
-from densarm.world.pair_queries import PairQueries
+from densarm.world.pair_queries import COAL_TOLERANCE, PairQueries
 
 DISTANCE_TOLERANCE = 1e-7
 """Bound on the error of a computed distance that certificates subtract [m].
@@ -88,7 +88,8 @@ class World(ChangingObstacles):
         reserve = Scene([*scene, *spare], scene.attachments)
         model = _geometry_model(arm, reserve)
         pair_shapes = [(pair.first, pair.second) for pair in model.collisionPairs]
-        super().__init__(model, np.array(pair_shapes, dtype=np.int64).reshape(-1, 2), reserve)
+        indices = np.array(pair_shapes, dtype=np.int64).reshape(-1, 2)
+        super().__init__(model, indices, reserve, arm.origin)
         self.n_pairs = len(pair_shapes)
         self._queries = PairQueries(arm.model, model, self.pair_shapes, remembers=True)
         self._geometry_data, self._data = self._queries.data, arm.model.createData()
@@ -164,7 +165,7 @@ class World(ChangingObstacles):
         if not np.isfinite(distance).any():
             return None
         k = int(distance.argmin())
-        points = self._queries.rows[k, 4:].reshape(2, 3).copy()
+        points = self._queries.rows[k, 4:].reshape(2, 3) + self.arm.origin
         return NearestPair(float(distance[k]), points, self.pairs[k])
 
     def base_overlaps(self) -> tuple[str, ...]:
@@ -232,7 +233,7 @@ def _geometry_model(arm: Arm, scene: Scene) -> pin.GeometryModel:
             raise InvalidValueError("attached body", name, allowed)
     model = arm.collision_model.copy()
     moving = [k for k, item in enumerate(model.geometryObjects) if item.parentJoint > 0]
-    for item in [item for obstacle in scene for item in geometry_objects(obstacle)]:
+    for item in [x for obstacle in scene for x in geometry_objects(obstacle, origin=arm.origin)]:
         if model.existGeometryName(item.name):
             allowed = f"other than the names of the shapes of {arm.name!r}"
             raise InvalidValueError("obstacle name", item.name, allowed)
