@@ -1,5 +1,6 @@
 """Self-collision pairs: every two links that move against each other, less what is excluded."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from enum import StrEnum
 from itertools import combinations
@@ -21,7 +22,11 @@ class Exclusion(StrEnum):
     """Why two shapes that move against each other are not checked for contact."""
 
     NEIGHBOURS = "neighbours"
-    """One joint alone lies between them, around which links touch by design."""
+    """One joint alone lies between them, around which links touch by design.
+
+    Of links that are fixed to each other those alone count that are nearest to the joint: the
+    base of a second arm, or a mast beside the first, is no neighbour of what turns on the base.
+    """
     SRDF = "srdf"
     """The SRDF disables the pair of their links."""
     ALWAYS = "always"
@@ -52,12 +57,13 @@ def add_self_collision_pairs(
     disabled = _disabled_links(model, srdf) if srdf is not None else set()
     items = list(geometry.geometryObjects)
     links = [model.frames[item.parentFrame].name for item in items]
+    carried = {(a, item.parentFrame) for a, item in _carriers(model, items)}
     excluded: dict[tuple[int, int], Exclusion] = {}
     for i, j in combinations(range(geometry.ngeoms), 2):
         a, b = items[i].parentJoint, items[j].parentJoint
         if a == b:
             continue
-        if model.parents[a] == b or model.parents[b] == a:
+        if (a, items[j].parentFrame) in carried or (b, items[i].parentFrame) in carried:
             excluded[i, j] = Exclusion.NEIGHBOURS
         elif frozenset((links[i], links[j])) in disabled:
             excluded[i, j] = Exclusion.SRDF
@@ -106,6 +112,27 @@ def srdf_postures(srdf: str | None) -> dict[str, dict[str, float]]:
         for joint in state.iter("joint"):
             posture[joint.get("name", "")] = _position(joint.get("value", ""))
     return postures
+
+
+def _carriers(
+    model: pin.Model, items: list[pin.GeometryObject]
+) -> Iterator[tuple[int, pin.GeometryObject]]:
+    """Yield each joint with the shapes it is fixed to, which by fixed joints are nearest to it."""
+    for joint in range(1, model.njoints):
+        frame = model.getFrameId(model.names[joint], pin.FrameType.JOINT)
+        root = _ancestors(model, model.frames[frame].parentFrame)
+        fixed = [item for item in items if item.parentJoint == model.parents[joint]]
+        away = [len(root ^ _ancestors(model, item.parentFrame)) for item in fixed]
+        yield from ((joint, item) for item, n in zip(fixed, away, strict=True) if n == min(away))
+
+
+def _ancestors(model: pin.Model, frame: int) -> set[int]:
+    """Return a frame and those above it up to the base, through every joint."""
+    found: set[int] = set()
+    while frame not in found:
+        found.add(frame)
+        frame = model.frames[frame].parentFrame
+    return found
 
 
 def _position(text: str) -> float:
