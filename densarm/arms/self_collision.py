@@ -1,5 +1,6 @@
 """Self-collision pairs: every two links that move against each other, less what is excluded."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from enum import StrEnum
 from itertools import combinations
@@ -34,6 +35,9 @@ class Exclusion(StrEnum):
 
     It may have several axes: revolute joints between whose links, of at most 20 mm and without
     shapes, lies nothing else.
+
+    Of links that are fixed to each other those alone count that are nearest to the joint: the
+    base of a second arm, or a mast beside the first, is no neighbour of what turns on the base.
     """
     SRDF = "srdf"
     """The SRDF disables the pair of their links, or one of them by default."""
@@ -71,14 +75,16 @@ def add_self_collision_pairs(
     alone = frozenset().union(*entries["disable_default_collisions"])
     items = list(geometry.geometryObjects)
     links = [model.frames[item.parentFrame].name for item in items]
-    before = _neighbours_before(model, {item.parentJoint for item in items})
+    carried = {(a, item.parentFrame) for a, item in _carriers(model, items)}
     excluded: dict[tuple[int, int], Exclusion] = {}
     for i, j in combinations(range(geometry.ngeoms), 2):
         a, b = items[i].parentJoint, items[j].parentJoint
         if a == b:
             continue
         pair = frozenset((links[i], links[j]))
-        if pair not in enabled and (before[a] == b or before[b] == a):
+        if pair not in enabled and (
+            (a, items[j].parentFrame) in carried or (b, items[i].parentFrame) in carried
+        ):
             excluded[i, j] = Exclusion.NEIGHBOURS
         elif pair in disabled or (pair & alone and pair not in enabled):
             excluded[i, j] = Exclusion.SRDF
@@ -128,6 +134,31 @@ def srdf_postures(srdf: str | None) -> dict[str, dict[str, float]]:
         for joint in state.iter("joint"):
             posture[joint.get("name", "")] = _position(joint.get("value", ""))
     return postures
+
+
+def _carriers(
+    model: pin.Model, items: list[pin.GeometryObject]
+) -> Iterator[tuple[int, pin.GeometryObject]]:
+    """Yield each joint with the shapes it is fixed to, which by fixed joints are nearest to it."""
+    before = _neighbours_before(model, {item.parentJoint for item in items})
+    for joint in range(1, model.njoints):
+        first = joint
+        while model.parents[first] != before[joint]:
+            first = int(model.parents[first])
+        frame = model.getFrameId(model.names[first], pin.FrameType.JOINT)
+        root = _ancestors(model, model.frames[frame].parentFrame)
+        fixed = [item for item in items if item.parentJoint == before[joint]]
+        away = [len(root ^ _ancestors(model, item.parentFrame)) for item in fixed]
+        yield from ((joint, item) for item, n in zip(fixed, away, strict=True) if n == min(away))
+
+
+def _ancestors(model: pin.Model, frame: int) -> set[int]:
+    """Return a frame and those above it up to the base, through every joint."""
+    found: set[int] = set()
+    while frame not in found:
+        found.add(frame)
+        frame = model.frames[frame].parentFrame
+    return found
 
 
 def _position(text: str) -> float:

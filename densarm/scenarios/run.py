@@ -167,6 +167,7 @@ def _plan(scenario: Scenario, start: Array, guide: Guide | None) -> Drive:
             kappa=control.kappa,
             period=period,
             timing=scenario.timing,
+            time_limit=scenario.simulation.time_limit,
         )
     except PlanningError as error:
         if error.motion is None:

@@ -152,6 +152,28 @@ def test_neighbours_around_a_joint_of_several_axes() -> None:
     assert named_pairs(row_with_hidden_link(0.0, "prismatic")) == also
 
 
+def test_of_links_fixed_to_each_other_the_nearest_alone_are_neighbours() -> None:
+    ball = '<collision><geometry><sphere radius="0.1"/></geometry></collision>'
+    urdf = '<robot name="mast"><link name="plate"/>' + "".join(
+        f'<link name="{link}">{INERTIAL}{"" if link == "flange" else ball}</link>'
+        for link in ("base", "mast", "flange", "one", "two")
+    )
+    for name, parent, child, kind in (
+        ("foot", "plate", "base", "fixed"),
+        ("stay", "plate", "mast", "fixed"),
+        ("top", "base", "flange", "fixed"),  # has no geometry: the base is nearest
+        ("j1", "flange", "one", "revolute"),
+        ("j2", "one", "two", "revolute"),
+    ):
+        urdf += (
+            f'<joint name="{name}" type="{kind}"><origin xyz="0.5 0 0"/><parent link="{parent}"/>'
+            f'<child link="{child}"/><axis xyz="0 0 1"/>'
+            '<limit lower="-3" upper="3" effort="1" velocity="1"/></joint>'
+        )
+    arm = Arm(RobotDescription(name="mast", urdf=urdf + "</robot>"))
+    assert named_pairs(arm) == expected(("base", "two"), ("mast", "one"), ("mast", "two"))
+
+
 @pytest.mark.parametrize("limit", ["1e15", "1.7e308"])
 def test_wide_limits(limit: str) -> None:
     urdf = (DATA / "branching.urdf").read_text()

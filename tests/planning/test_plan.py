@@ -17,10 +17,10 @@ from densarm.density.navigation_density import DensityParameters
 from densarm.density.sub_goals import GuidedDensity, SubGoals
 from densarm.density.unsafe_sets import SensingParameters
 from densarm.errors import InvalidValueError
-from densarm.planning.guide import GuidePath, NoPath
+from densarm.planning.guide import FreeSpace, GuidePath, NoPath
 from densarm.planning.integral_curve import IntegralCurve, integral_curve
 from densarm.planning.motion import Motion, PlanningError, TimingParameters
-from densarm.planning.path_guide import PathGuideParameters
+from densarm.planning.path_guide import PathGuide, PathGuideParameters
 from densarm.planning.plan import PATH_MARGIN, PLANNING_ALPHA, plan_motion, plan_path
 from densarm.scenarios.scenario import Scenario, load_scenario
 from densarm.scene.obstacles import Box, Obstacle, Sphere
@@ -102,6 +102,22 @@ def test_goal_out_of_reach_is_no_path(fenced_in: Scenario) -> None:
     assert "1 searches by RRT-Connect of 50 iterations each found no path" in error.detail
     assert error.detail.endswith(" mm")
     assert error.motion is None
+
+
+def test_a_second_search_is_made_under_the_smallest_margin_alone(
+    fenced_in: Scenario, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    made: list[tuple[int, int]] = []
+
+    class Watched(PathGuide):
+        def __init__(self, arm: Arm, freedom: FreeSpace, parameters: PathGuideParameters) -> None:
+            made.append((parameters.iterations, parameters.searches))
+            super().__init__(arm, freedom, parameters)
+
+    monkeypatch.setattr("densarm.planning.plan.PathGuide", Watched)
+    search = PathGuideParameters(iterations=100, searches=3)
+    why_not(fenced_in.world, fenced_in.start, fenced_in.goal, search=search)
+    assert made == [(1, 1), (100, 1), (100, 3)]
 
 
 @pytest.fixture(scope="module")
