@@ -154,7 +154,7 @@ class World(ChangingObstacles):
 
         Returns:
             Rows [distance, normal from body 1 to 2, nearest point of each] of all pairs (K, 10),
-            new where asked for; the next query overwrites them.
+            new where asked for, points seen from `Arm.origin`; the next query overwrites them.
         """
         pin.forwardKinematics(self.arm.model, self._data, q)
         return self._measured(pairs)
