@@ -29,10 +29,11 @@ _LEAST_GAIN = 1e-3  # of a path's length; a shortcut that gains less is not wort
 class PathGuideParameters:
     """How long and how finely `PathGuide` searches; no clock decides anything."""
 
-    iterations: int = 50_000
-    """Samples that one search draws at most."""
+    iterations: int = 25_000
+    """Samples that one search draws at most. To find the nearest state of a tree takes the longer
+    the more it has: joint space is better searched again than for longer."""
 
-    near_share: float = 0.08
+    near_share: float = 0.16
     """Share of the first search's samples that are drawn near start and goal, and tried alone
     before the others: most paths need no more of the space, and are found sooner there, and
     shorter; 0 to 1. No more than 4^nv are, for what arms of few joints do not find soon is not
@@ -42,7 +43,7 @@ class PathGuideParameters:
     """How far beyond its positions at start and goal, and those between, a joint is near [rad or
     m]."""
 
-    searches: int = 2
+    searches: int = 3
     """Searches from scratch, each with its own seed, before giving up."""
 
     extension: float = 1.0

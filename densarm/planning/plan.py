@@ -43,9 +43,9 @@ _LIMIT_INSET = 0.002  # [rad or m] from position limits at which a motion leaves
 
 # Shares of the path margin and of the planner's iterations, tried in turn: most spaces are wide,
 # and a narrow passage may leave less distance than wanted. Where not all are to be spent, those
-# that are draw samples near both ends above all. A second search is worth its time under the last
-# margin alone: what none finds under a larger one rather needs a smaller one than more samples.
-_ATTEMPTS = ((1.0, 0.01), (0.25, 1.0), (0.05, 1.0))
+# that are draw samples near both ends above all. Under all margins but the last half of the
+# searches are made: what they do not find rather needs a smaller margin than more samples.
+_ATTEMPTS = ((1.0, 0.02), (0.25, 1.0), (0.05, 1.0))
 
 _AT_GOAL = 1e-7  # [rad or m]; a shorter way is left to feedback, for rounding shapes its curve
 
@@ -188,7 +188,9 @@ def _searched(
     spaces = {kept: SeparatingPlanes(world, margin + kept) for kept in attempts}
     began = time.perf_counter()
     for kept, effort in attempts.items():
-        parameters = search if kept == min(attempts) else replace(search, searches=1)
+        parameters = search
+        if kept > min(attempts):
+            parameters = replace(search, searches=math.ceil(0.5 * search.searches))
         if effort < 1.0:
             iterations = math.ceil(effort * search.iterations)
             parameters = replace(search, iterations=iterations, near_share=1.0, searches=1)
