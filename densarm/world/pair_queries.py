@@ -59,6 +59,7 @@ class PairQueries:
         self.rows: Array = self._view.read()
         """[distance, normal, point 1, point 2] (K, 10) [m], each of the pair's last query."""
         self._ask_again()
+        self.ask(np.zeros(0, np.int64))  # its kernel is loaded before a control loop
 
     def ask(self, pairs: NDArray[np.int64]) -> None:
         """Query some pairs (P,)."""

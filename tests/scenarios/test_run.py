@@ -152,7 +152,7 @@ def test_infeasible_start_and_goal_name_pairs_depths_joints_and_limits(
     assert "start: panda_" in done.detail
     assert " and ball overlap by " in done.detail
     assert " mm" in done.detail
-    assert "goal: joint 'panda_joint4' at 0.5 is outside [-3.072, -0.0698]" in done.detail
+    assert "goal: joint 'panda_joint4' at 0.5 is outside [-3.0718, -0.0698]" in done.detail
     assert done.plan_time == done.preparation_time == 0.0
     assert len(done.q) == 1
     assert not done.certified
