@@ -203,6 +203,7 @@ TREE = st.recursive(
 )
 
 
+@pytest.mark.slow
 @settings(max_examples=75)
 @given(data=st.data(), junk=TREE)
 def test_wrong_values_raise_nothing_else(folder: Path, data: st.DataObject, junk: Any) -> None:
