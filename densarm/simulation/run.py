@@ -17,7 +17,7 @@ from densarm.values.arrays import Array
 from densarm.values.documented import documented
 from densarm.values.files import atomic_file
 from densarm.values.outcome import Outcome
-from densarm.world.world import World
+from densarm.world.world import World, base_overlaps
 
 _MAX_BYTES = 4_000_000_000  # unpacked; the longest run of a seven-joint arm has half of it
 _UNIT_TOLERANCE = 1e-6
@@ -89,7 +89,7 @@ class Run:
     @cached_property
     def base_overlaps(self) -> tuple[str, ...]:
         """As `World.base_overlaps`: what the certificate, being about motion, is not about."""
-        return World(self.task.arm, self.task.scene).base_overlaps()
+        return base_overlaps(self.task.arm, self.task.scene)
 
     @property
     def certified(self) -> bool:

@@ -18,7 +18,7 @@ from densarm.values.documented import documented
 from densarm.world.distance_view import add_pair_gradients
 from densarm.world.lipschitz import joint_support, shape_lipschitz
 from densarm.world.obstacle_slots import ChangingObstacles
-from densarm.world.pair_queries import COAL_TOLERANCE, PairQueries
+from densarm.world.pair_queries import PairQueries
 
 DISTANCE_TOLERANCE = 1e-7
 """Bound on the error of a computed distance that certificates subtract [m].
@@ -169,25 +169,8 @@ class World(ChangingObstacles):
         return NearestPair(float(distance[k]), points, self.pairs[k])
 
     def base_overlaps(self) -> tuple[str, ...]:
-        """Return which obstacles the arm's base is more than 5 mm inside of, a phrase each.
-
-        That is everything that no joint moves. No distance is computed of it, since none would
-        change: the arm stands in its table, or one of the two is not where it is said to be.
-        """
-        still = [item for item in self.arm.collision_model.geometryObjects if not item.parentJoint]
-        around = [item for slot in self._present.values() for item in slot.shapes]
-        found, request = [], coal.DistanceRequest()
-        request.gjk_tolerance = request.epa_tolerance = COAL_TOLERANCE
-        for bodies in product(still, around):
-            poses = [
-                coal.Transform3s(b.placement.rotation, b.placement.translation) for b in bodies
-            ]
-            first, second = zip((body.geometry for body in bodies), poses, strict=True)
-            depth = -coal.distance(*first, *second, request, coal.DistanceResult())
-            if depth > _OVERLAP:
-                names = " is in ".join(repr(body.name) for body in bodies)
-                found.append(f"{names} by {1e3 * depth:.3g} mm")
-        return tuple(found)
+        """Return what the function of this name does, of the obstacles as they are now."""
+        return base_overlaps(self.arm, self.scene)
 
     def motion_bound(self, step: Array, pairs: Pairs | None = None) -> Array:
         r"""Return how far the bodies of each pair move against each other at most [m].
@@ -224,6 +207,26 @@ class World(ChangingObstacles):
             else:
                 self._geometry_data.activateCollisionPair(k)
         self._is_spare = is_spare
+
+
+def base_overlaps(arm: Arm, scene: Scene) -> tuple[str, ...]:
+    """Return which obstacles an arm's base is more than 5 mm inside of, a phrase each.
+
+    The base is all that no joint moves. A world has no distance of it, since none would change: the
+    arm stands in its table, or one of the two is not where it is said to be.
+    """
+    still = [item for item in arm.collision_model.geometryObjects if not item.parentJoint]
+    around = [x for obstacle in scene for x in geometry_objects(obstacle, origin=arm.origin)]
+    found = []
+    for bodies in product(still, around):
+        poses = [coal.Transform3s(b.placement.rotation, b.placement.translation) for b in bodies]
+        first, second = zip((body.geometry for body in bodies), poses, strict=True)
+        # At coal's own tolerance of 1e-6 m: at tighter ones it may find no distance.
+        depth = -coal.distance(*first, *second, coal.DistanceRequest(), coal.DistanceResult())
+        if depth > _OVERLAP:
+            names = " is in ".join(repr(body.name) for body in bodies)
+            found.append(f"{names} by {1e3 * depth:.3g} mm")
+    return tuple(found)
 
 
 def _geometry_model(arm: Arm, scene: Scene) -> pin.GeometryModel:
