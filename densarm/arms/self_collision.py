@@ -9,6 +9,7 @@ import numpy as np
 import pinocchio as pin
 
 from densarm.arms.description import parse_robot_xml
+from densarm.arms.joint_space import joint_axis
 from densarm.errors import RobotDescriptionError
 from densarm.values.arrays import Array
 
@@ -199,7 +200,7 @@ def _neighbours_before(model: pin.Model, shaped: set[int]) -> list[int]:
     for joint in range(1, model.njoints):
         child, parent, length = joint, before[joint], 0.0
         while parent > 0 and parent not in shaped:
-            slides = any(_slides(model, k) for k in (child, parent))
+            slides = joint_axis(model, child)[1] or joint_axis(model, parent)[1]
             length += float(np.linalg.norm(model.jointPlacements[child].translation))
             if slides or length > _JOINT_SIZE:
                 break
@@ -207,10 +208,6 @@ def _neighbours_before(model: pin.Model, shaped: set[int]) -> list[int]:
         else:
             before[joint] = parent
     return before
-
-
-def _slides(model: pin.Model, joint: int) -> bool:
-    return not model.joints[joint].createData().S[3:].any()
 
 
 def _random_configuration(model: pin.Model, random: np.random.Generator) -> Array:

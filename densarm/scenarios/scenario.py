@@ -11,6 +11,7 @@ import numpy as np
 
 from densarm.arms.arm import Arm, load_arm
 from densarm.arms.catalogue import scenario_paths
+from densarm.arms.joint_space import sliding_joints
 from densarm.certificates.task import Input, SimulationParameters, Task
 from densarm.control.controller import Gains
 from densarm.control.speed_law import SpeedParameters
@@ -35,7 +36,6 @@ from densarm.values.checks import (
 from densarm.values.documented import documented
 from densarm.values.files import read_toml
 from densarm.values.tables import parse_table
-from densarm.world.lipschitz import sliding_joints
 from densarm.world.world import World
 
 
@@ -281,8 +281,8 @@ def _configuration(arm: Arm, key: str, value: str | tuple[float, ...]) -> Array:
             raise UnknownNameError(f"posture for {key}", value, arm.postures)
         return arm.postures[value]
     angles = finite_vector(f"{key} (one number per joint, or a posture)", value, arm.nv)
-    limits, turns = arm.limits, sliding_joints(arm.model) == 0.0
-    outside = (angles < limits.lower) | (angles > limits.upper)
+    limits, turns = arm.limits, ~sliding_joints(arm.model)
+    outside = limits.excess(angles) > 0.0
     for joint in np.flatnonzero(outside & turns & (np.abs(angles) > 2.0 * np.pi))[:1]:
         low, high = limits.lower[joint], limits.upper[joint]
         allowed = (

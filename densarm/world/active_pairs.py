@@ -9,10 +9,9 @@ from numpy.typing import NDArray
 
 from densarm.arms.arm import Arm
 from densarm.arms.dynamics import Kinematics
-from densarm.arms.joint_space import joint_error
+from densarm.arms.joint_space import joint_error, sliding_joints
 from densarm.values.arrays import Array
 from densarm.values.kernels import compiled, compiled_part
-from densarm.world.lipschitz import sliding_joints
 from densarm.world.pair_queries import PairQueries
 from densarm.world.world import DISTANCE_TOLERANCE, World
 

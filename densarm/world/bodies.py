@@ -14,10 +14,10 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
+from densarm.arms.joint_space import joint_axis
 from densarm.scene.shapes import box_hull, convex_hull, extreme_points
 from densarm.values.arrays import Array
 from densarm.values.kernels import compiled_part
-from densarm.world.lipschitz import joint_axis
 from densarm.world.world import World
 
 _WIDEST = 1e3  # [m], of the cube that stands for a half-space
