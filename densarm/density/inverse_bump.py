@@ -15,6 +15,7 @@ T_MIN = 1e-6
 """Below this argument the step is contact: f̄(T_MIN) = exp(−10⁶) is no longer a double."""
 
 _CONTACT_SLOPE = 1.0 / (T_MIN * T_MIN) + 1.0 / ((1.0 - T_MIN) * (1.0 - T_MIN))
+_DIFFERENCE = 1e-4  # of the width
 
 
 def smooth_step(t: ArrayLike) -> Array:
@@ -112,3 +113,18 @@ def log_inverse_bump(h: float, width: float, theta: float) -> tuple[float, float
         log_value = max(log_theta, log_step) + math.log1p(math.exp(-abs(log_step - log_theta)))
         share = math.exp(log_step - log_value)
     return log_value, share * complement * (from_zero * from_zero + from_one * from_one) / width
+
+
+@compiled
+def bump_curvature(h: float, width: float, theta: float) -> float:
+    """Return -∂²lnΨ/∂h² at constant width where that is positive, else zero.
+
+    By a central difference of the slope of `log_inverse_bump`, whose arguments these are: it
+    decides how long a step is, and no more.
+    """
+    if h >= width:
+        return 0.0
+    step = _DIFFERENCE * width
+    below = log_inverse_bump(h - step, width, theta)[1]
+    above = log_inverse_bump(h + step, width, theta)[1]
+    return max(0.0, (below - above) / (2.0 * step))

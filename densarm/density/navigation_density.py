@@ -14,6 +14,7 @@ from densarm.density.goal_distance import GoalDistance, TorusDistance
 from densarm.density.inverse_bump import smooth_step
 from densarm.density.unsafe_sets import (
     ClearanceSet,
+    Curved,
     JointLimitSet,
     SensingParameters,
     UnsafeSet,
@@ -234,6 +235,13 @@ class NavigationDensity:
             *self._exponents[gauge],
             out,
         )
+
+    def write_curvature(self, q: Array, out: Array) -> None:
+        """Write what the unsafe sets that are `Curved` add to `out` (nv, nv); q was updated."""
+        out[:] = 0.0
+        for unsafe_set in self.unsafe_sets:
+            if isinstance(unsafe_set, Curved):
+                unsafe_set.add_curvature(q, self.parameters.theta, out)
 
     def log_gradients(self, q: Array, steps: Array) -> Array:
         """Return ∇ ln ρ (..., nv) at all q ⊕ x, for steps x (..., nv) from q (nq,)."""

@@ -3,13 +3,13 @@
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from densarm.arms.arm import Arm
-from densarm.density.inverse_bump import log_inverse_bump
+from densarm.density.inverse_bump import bump_curvature, log_inverse_bump
 from densarm.errors import InvalidValueError
 from densarm.values.arrays import Array
 from densarm.values.checks import non_negative, positive, positive_array
@@ -69,6 +69,24 @@ class UnsafeSet(Protocol):
         ...
 
 
+@runtime_checkable
+class Curved(Protocol):
+    """An unsafe set that tells how ln Ψ bends too, for long steps of an integral curve."""
+
+    def add_curvature(self, q: Array, theta: float, out: Array) -> None:
+        r"""Add the part of the Hessian of -Σ ln Ψ that keeps away from the set, in place.
+
+        .. math:: \sum_k \max\Bigl(0,
+            -\frac{\partial^2 \ln\Psi_k}{\partial h_k^2}\Bigr) \nabla h_k \nabla h_k^T
+
+        Args:
+            q: configuration of the last `UnsafeSet.add_log_bump`, shape (nq,).
+            theta: as there.
+            out: positive semidefinite (nv, nv), added to.
+        """
+        ...
+
+
 class ClearanceSet:
     r"""Configurations at which a pair of bodies is closer than a margin.
 
@@ -124,6 +142,14 @@ class ClearanceSet:
             out_gradient,
         )
 
+    def add_curvature(self, q: Array, theta: float, out: Array) -> None:  # noqa: ARG002
+        """Act as `Curved.add_curvature`."""
+        pairs = self.pairs
+        jacobian, sign = pairs.kinematics.jacobian, self.world.sign
+        _add_active_curvature(
+            pairs.state, pairs.rows, jacobian, sign, self.margin, self.sensing_distance, theta, out
+        )
+
 
 class JointLimitSet:
     r"""Configurations at or beyond a position limit of a bounded joint.
@@ -157,6 +183,13 @@ class JointLimitSet:
     def add_log_bump(self, q: Array, theta: float, out_gradient: Array) -> float:
         """Act as `UnsafeSet.add_log_bump`."""
         return _add_limit_log_bumps(q, self.index, self.member, theta, out_gradient)
+
+    def add_curvature(self, q: Array, theta: float, out: Array) -> None:
+        """Act as `Curved.add_curvature`."""
+        bound, side, width = self.member
+        h = side * (q[self.index[1]] - bound)
+        for joint, h_k, width_k in zip(self.index[0], h, width, strict=True):
+            out[joint, joint] += bump_curvature(h_k, width_k, theta)
 
 
 class ImplicitSet:
@@ -214,6 +247,30 @@ def _add_active_log_bumps(
         if slope != 0.0:
             add_pair_gradient(rows[k], jacobian, sign[k], slope, out_gradient)
     return total
+
+
+@compiled
+def _add_active_curvature(
+    state: NDArray[np.int64],
+    rows: Array,
+    jacobian: Array,
+    sign: Array,
+    margin: float,
+    width: Array,
+    theta: float,
+    out: Array,
+) -> None:
+    gradient = np.empty(out.shape[0])
+    for k in range(state.shape[0]):
+        if state[k] == 0:
+            continue
+        curvature = bump_curvature(rows[k, 0] - margin, width[k], theta)
+        if curvature > 0.0:
+            gradient[:] = 0.0
+            add_pair_gradient(rows[k], jacobian, sign[k], 1.0, gradient)
+            for i in range(out.shape[0]):
+                for j in range(out.shape[0]):
+                    out[i, j] += curvature * gradient[i] * gradient[j]
 
 
 @compiled
