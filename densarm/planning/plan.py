@@ -3,6 +3,7 @@
 import math
 import time
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -16,7 +17,7 @@ from densarm.errors import InvalidValueError
 from densarm.planning.guide import Guide, NoPath
 from densarm.planning.integral_curve import IntegralCurve, integral_curve
 from densarm.planning.motion import Motion, PlanningError, TimingParameters
-from densarm.planning.path_guide import PathGuide, PathGuideParameters
+from densarm.planning.path_guide import PathGuide, PathGuideParameters, shortcut
 from densarm.values.arrays import Array
 from densarm.values.checks import non_negative, non_negative_integer, one_of
 from densarm.values.outcome import Outcome
@@ -51,6 +52,8 @@ _AT_GOAL = 1e-7  # [rad or m]; a shorter way is left to feedback, for rounding s
 
 _END_SHARE = 0.5  # of the clearance at start and goal that a path's margin may take
 _SMOOTH_SHARE = 0.5  # of a path's or curve's distance margin that the smooth path keeps
+_ROOMY = 0.03  # [m] beyond the margin, where chords may cut a curve short
+_LEAST_KEPT = 1e-4  # [m], less than which a smooth path keeps nothing
 _STOP_SHARE = 0.5  # of the smooth path's that stopping keeps too; the rest is for tracking errors
 
 
@@ -119,8 +122,8 @@ def plan_motion(
     curve = _curve(check, path, distance, replace(density, alpha=alpha), sensing)
     points = np.vstack([start, curve.q])
     kept = _SMOOTH_SHARE * planned.distance_margin
-    if not path.is_clear:  # nor is the curve, but its steps are a share of its clearance
-        kept = max(0.0, min(kept, _SMOOTH_SHARE * check.least_distance_margin(points)))
+    if not path.is_clear:
+        points, kept = _shortened(world, margin, kept, points, search, seed)
     motion = replace(
         _timed(world, margin, kept, points, period, timing, time_limit),
         margin=margin,
@@ -249,6 +252,24 @@ def _curve(
         if returned.reached:
             return replace(returned, q=returned.q[::-1])
     return curve
+
+
+def _shortened(
+    world: World, margin: float, kept: float, points: Array, search: PathGuideParameters, seed: int
+) -> tuple[Array, float]:
+    """Return a shorter polyline (N, nq), and the distance that a smooth path near it may keep [m].
+
+    The chords of a curve that climbs among obstacles are proved clear beyond the margin alone.
+    """
+    rng = np.random.default_rng(seed)
+    roomy = SeparatingPlanes(world, margin + _ROOMY)
+    points = shortcut(world.arm, roomy, points, search.shortcuts, rng)
+    while kept > _LEAST_KEPT:
+        space = SeparatingPlanes(world, margin + kept)
+        if all(space.segment_is_clear(a, b) for a, b in pairwise(points)):
+            return points, _SMOOTH_SHARE * kept
+        kept *= 0.5
+    return points, 0.0
 
 
 def _timed(
