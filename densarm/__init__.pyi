@@ -30,10 +30,10 @@ from .errors import SceneChangedError as SceneChangedError
 from .errors import UnknownNameError as UnknownNameError
 from .planning.guide import Guide as Guide
 from .planning.guide import NoPath as NoPath
+from .planning.guide import PlanningParameters as PlanningParameters
 from .planning.motion import Motion as Motion
 from .planning.motion import PlanningError as PlanningError
 from .planning.motion import TimingParameters as TimingParameters
-from .planning.path_guide import PathGuideParameters as PathGuideParameters
 from .planning.plan import plan_motion as plan_motion
 from .planning.plan import plan_path as plan_path
 from .scenarios.run import run as run

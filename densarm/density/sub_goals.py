@@ -40,6 +40,10 @@ class GuidePath:
     """(W, nq) configurations, W >= 2; the first is the start, the last the goal."""
     is_clear: bool
     """Whether every segment is proved free of contact."""
+    found_by: str = ""
+    """What found it, as a phrase; empty for a guide of one's own."""
+    stuck: str = ""
+    """Where the density alone gets stuck, and what blocks it; empty where it was not so tried."""
 
 
 class SubGoals:

@@ -4,10 +4,65 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from densarm.density.sub_goals import GuidePath
+from densarm.errors import InvalidValueError
 from densarm.values.arrays import Array
+from densarm.values.checks import non_negative, non_negative_integer, positive, positive_integer
 from densarm.values.documented import documented
 
-__all__ = ["FreeSpace", "Guide", "GuidePath", "NoPath"]
+__all__ = ["FreeSpace", "Guide", "GuidePath", "NoPath", "PlanningParameters"]
+
+
+@documented
+@dataclass(frozen=True)
+class PlanningParameters:
+    """How long and how finely ways are searched; no clock decides anything.
+
+    Raises:
+        InvalidValueError: a value out of its range.
+    """
+
+    iterations: int = 25_000
+    """Samples that one search of the planner draws at most. To find the nearest state of a tree
+    takes the longer the more it has: joint space is better searched again than for longer."""
+
+    near_share: float = 0.16
+    """Share of the first search's samples that are drawn near start and goal, and tried alone
+    before the others: most paths need no more of the space, and are found sooner there, and
+    shorter; 0 to 1. No more than 4^nv are, for what arms of few joints do not find soon is not
+    there."""
+
+    near_distance: float = 1.0
+    """How far beyond its positions at start and goal, and those between, a joint is near [rad or
+    m]."""
+
+    searches: int = 3
+    """Searches from scratch, each with its own seed, before giving up."""
+
+    extension: float = 1.0
+    """Longest edge that the first search adds to its trees; the second adds edges up to twice as
+    long, and so on, as neither suits all spaces [rad or m]."""
+
+    shortcuts: int = 300
+    """Shortcuts tried on a way that was found."""
+
+    limit_margin: float = 0.02
+    """Distance that paths keep from position limits, or half of what start and goal keep where
+    that is less [rad or m]."""
+
+    vias: int = 20
+    """Via points at most, from which the density leads to start and goal where it does not lead
+    from one to the other."""
+
+    def __post_init__(self) -> None:
+        non_negative_integer("vias", self.vias)
+        positive_integer("iterations", self.iterations)
+        if not 0.0 <= self.near_share <= 1.0:
+            raise InvalidValueError("near_share", self.near_share, "in [0, 1]")
+        positive("near_distance", self.near_distance)
+        positive_integer("searches", self.searches)
+        positive("extension", self.extension)
+        positive_integer("shortcuts", self.shortcuts)
+        non_negative("limit_margin", self.limit_margin)
 
 
 @documented

@@ -1,6 +1,7 @@
 """The integral curve of the density from a start along its sub-goals: the planning system."""
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -18,7 +19,7 @@ _SEARCHES = 40  # halvings of the interval of ln τ
 _ACCURACY = 1.1  # factor within which τ is found
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class IntegralCurve:
     """What the planning system did."""
 
@@ -26,8 +27,13 @@ class IntegralCurve:
     """Points of the curve (N, nq), N >= 1, from the start."""
     reached: bool
     """Whether the last point is the goal; else it is where the curve got stuck."""
-    detail: str
-    """Where it got stuck and what blocks it; empty when reached."""
+    guided: GuidedDensity
+    """The density that led, as it was at the last point."""
+
+    @cached_property
+    def detail(self) -> str:
+        """Where it got stuck and what blocks it, looked for when first asked; empty if reached."""
+        return "" if self.reached else self.guided.describe_stall(self.q[-1])
 
 
 def integral_curve(guided: GuidedDensity, margin: float, start: Array) -> IntegralCurve:
@@ -55,7 +61,7 @@ def integral_curve(guided: GuidedDensity, margin: float, start: Array) -> Integr
         guided.update(q)
         error = density.error(q)
         if goals.is_last and np.abs(error).max() <= _ARRIVED:
-            return IntegralCurve(np.array([*points[:-1], goals.q[-1]]), reached=True, detail="")
+            return IntegralCurve(np.array([*points[:-1], goals.q[-1]]), reached=True, guided=guided)
         if guided.is_critical():
             break
         q_next = climb.in_sight(q, error)
@@ -66,7 +72,7 @@ def integral_curve(guided: GuidedDensity, margin: float, start: Array) -> Integr
             length = float(np.linalg.norm(guided.world.arm.difference(q, q_next)))
         q = q_next
         points.append(q)
-    return IntegralCurve(np.array(points), reached=False, detail=guided.describe_stall(q))
+    return IntegralCurve(np.array(points), reached=False, guided=guided)
 
 
 class _Climb:

@@ -2,94 +2,42 @@
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
 
 from densarm.arms.arm import Arm
 from densarm.arms.joints import POSITION_TOLERANCE
 from densarm.errors import InvalidValueError
-from densarm.planning.guide import FreeSpace, GuidePath, NoPath
+from densarm.planning.guide import FreeSpace, GuidePath, NoPath, PlanningParameters
+from densarm.planning.sampling import Bounds, SamplingBounds
+from densarm.planning.shortening import shortened
 from densarm.values.arrays import Array
-from densarm.values.checks import non_negative, positive, positive_integer
-from densarm.values.documented import documented
-
-Bounds = tuple[Array, Array]
-"""Lowest and highest position of each joint (nv,) [rad or m]."""
 
 _POSITIONS = 4
 """Of each joint, whose combinations are as many samples as a search near both ends is worth."""
-
-_LEAST_GAIN = 1e-3  # of a path's length; a shortcut that gains less is not worth a check
-
-
-@documented
-@dataclass(frozen=True)
-class PathGuideParameters:
-    """How long and how finely `PathGuide` searches; no clock decides anything."""
-
-    iterations: int = 25_000
-    """Samples that one search draws at most. To find the nearest state of a tree takes the longer
-    the more it has: joint space is better searched again than for longer."""
-
-    near_share: float = 0.16
-    """Share of the first search's samples that are drawn near start and goal, and tried alone
-    before the others: most paths need no more of the space, and are found sooner there, and
-    shorter; 0 to 1. No more than 4^nv are, for what arms of few joints do not find soon is not
-    there."""
-
-    near_distance: float = 1.0
-    """How far beyond its positions at start and goal, and those between, a joint is near [rad or
-    m]."""
-
-    searches: int = 3
-    """Searches from scratch, each with its own seed, before giving up."""
-
-    extension: float = 1.0
-    """Longest edge that the first search adds to its trees; the second adds edges up to twice as
-    long, and so on, as neither suits all spaces [rad or m]."""
-
-    shortcuts: int = 100
-    """Shortcuts tried on a path that was found."""
-
-    limit_margin: float = 0.02
-    """Distance that paths keep from position limits, or half of what start and goal keep where
-    that is less [rad or m]."""
-
-    def __post_init__(self) -> None:
-        positive_integer("iterations", self.iterations)
-        if not 0.0 <= self.near_share <= 1.0:
-            raise InvalidValueError("near_share", self.near_share, "in [0, 1]")
-        positive("near_distance", self.near_distance)
-        positive_integer("searches", self.searches)
-        positive("extension", self.extension)
-        positive_integer("shortcuts", self.shortcuts)
-        non_negative("limit_margin", self.limit_margin)
 
 
 class PathGuide:
     """Search a path whose every segment is proved clear, and shorten it.
 
     The straight segment comes first, being the shortest path; then RRT-Connect (Kuffner and
-    LaValle, ICRA 2000; by OMPL), near both ends and then everywhere, then shortcuts between random
-    points of the path found.
+    LaValle, ICRA 2000; by OMPL), near both ends and then everywhere, then `shortened`.
 
     Args:
         arm: the arm; every joint that is not continuous needs position limits.
         freedom: the free space, which proves every edge.
-        parameters: see `PathGuideParameters`.
+        parameters: see `PlanningParameters`.
 
     Raises:
         InvalidValueError: a joint whose position limits leave no interval to search in.
     """
 
     def __init__(
-        self, arm: Arm, freedom: FreeSpace, parameters: PathGuideParameters | None = None
+        self, arm: Arm, freedom: FreeSpace, parameters: PlanningParameters | None = None
     ) -> None:
         self._arm = arm
         self._freedom = freedom
-        self._parameters = parameters or PathGuideParameters()
+        self._parameters = parameters or PlanningParameters()
         lower, upper = arm.limits.lower, arm.limits.upper
         width = upper - lower
         for joint in np.flatnonzero(~arm.continuous & ~((width > 0.0) & np.isfinite(width))):
@@ -105,7 +53,9 @@ class PathGuide:
             if fault := self._fault(q):
                 return NoPath(f"the {name} {fault}")
         if self._freedom.segment_is_clear(start, goal):
-            return GuidePath(np.stack([start, goal]), is_clear=True)
+            return GuidePath(
+                np.stack([start, goal]), is_clear=True, found_by="the straight segment"
+            )
         return self._search(start, goal, np.random.default_rng(seed))
 
     def _search(self, start: Array, goal: Array, rng: np.random.Generator) -> GuidePath | NoPath:
@@ -124,8 +74,8 @@ class PathGuide:
             )
             if path is not None:
                 tries = self._parameters.shortcuts
-                path = shortcut(self._arm, self._freedom, path, tries, rng)
-                return GuidePath(path, is_clear=True)
+                path = shortened(self._arm, self._freedom, path, tries, rng)
+                return GuidePath(path, is_clear=True, found_by="RRT-Connect")
         p = self._parameters
         return NoPath(
             f"the straight segment is not clear, and {p.searches} searches by RRT-Connect of "
@@ -135,33 +85,14 @@ class PathGuide:
     def _searches(self, start: Array, goal: Array) -> Iterator[tuple[int, Bounds, float]]:
         """Yield the iterations of each search, where it draws samples, and its longest edge."""
         p = self._parameters
-        first = self._arm.angles(start)
-        ends = np.stack([first, first + self._arm.difference(start, goal)])
-        everywhere = self._bounds(ends)
+        bounds = SamplingBounds(self._arm, p, start, goal)
         alone = min(math.ceil(p.near_share * p.iterations), _POSITIONS**self._arm.nv)
         if alone > 0:
-            yield alone, self._near(ends, everywhere), p.extension
+            yield alone, bounds.near, p.extension
         if alone < p.iterations:
-            yield p.iterations - alone, everywhere, p.extension
+            yield p.iterations - alone, bounds.everywhere, p.extension
         for search in range(2, p.searches + 1):
-            yield p.iterations, everywhere, search * p.extension
-
-    def _near(self, ends: Array, everywhere: Bounds) -> Bounds:
-        """Return where joints are near both ends; a continuous one anywhere if that is a turn."""
-        away = self._parameters.near_distance
-        lower = np.maximum(everywhere[0], ends.min(axis=0) - away)
-        upper = np.minimum(everywhere[1], ends.max(axis=0) + away)
-        is_anywhere = self._arm.continuous & (upper - lower >= 2.0 * np.pi)
-        return np.where(is_anywhere, -np.inf, lower), np.where(is_anywhere, np.inf, upper)
-
-    def _bounds(self, ends: Array) -> Bounds:
-        """Return position limits (nv,) moved inwards by the limit margin; continuous: infinite."""
-        limits = self._arm.limits
-        below, above = (ends - limits.lower).min(axis=0), (limits.upper - ends).min(axis=0)
-        margin = self._parameters.limit_margin
-        # An end may exceed a limit by the tolerance, and is in the bounds all the same.
-        within = [np.minimum(margin, np.minimum(room, 0.5 * room)) for room in (below, above)]
-        return limits.lower + within[0], limits.upper - within[1]
+            yield p.iterations, bounds.everywhere, search * p.extension
 
     def _fault(self, q: Array) -> str | None:
         excess = self._arm.limits.excess(self._arm.angles(q))
@@ -170,31 +101,3 @@ class PathGuide:
             names = ", ".join(self._arm.joint_names[joint] for joint in outside)
             return f"is outside the position limits of {names}"
         return None if self._freedom.configuration_is_clear(q) else "is not clear of contact"
-
-
-def shortcut(
-    arm: Arm, freedom: FreeSpace, path: Array, steps: int, rng: np.random.Generator
-) -> Array:
-    """Shorten a path (W, nq) by clear segments between so many pairs of random points of it."""
-    step, length, arc = _arc_length(arm, path)
-    for share in np.sort(rng.uniform(size=(steps, 2))):
-        s = share * arc[-1]
-        segment = np.searchsorted(arc[1:-1], s, side="right")
-        fraction = (s - arc[segment]) / length[segment]
-        a, b = arm.integrate(path[segment], fraction[:, None] * step[segment])
-        gain = (s[1] - s[0]) - np.linalg.norm(arm.difference(a, b))
-        if gain > _LEAST_GAIN * arc[-1] and freedom.segment_is_clear(a, b):
-            path = np.vstack([path[: segment[0] + 1], a, b, path[segment[1] + 1 :]])
-            step, length, arc = _arc_length(arm, path)
-    kept = [path[0]]
-    for waypoint, after in pairwise(path[1:]):
-        if not freedom.segment_is_clear(kept[-1], after):
-            kept.append(waypoint)
-    return np.stack([*kept, path[-1]])
-
-
-def _arc_length(arm: Arm, path: Array) -> tuple[Array, Array, Array]:
-    """Return the steps of a path, their lengths, and the length up to each waypoint."""
-    step = arm.difference(path[:-1], path[1:])
-    length = np.linalg.norm(step, axis=1)
-    return step, length, np.concatenate([[0.0], np.cumsum(length)])

@@ -9,15 +9,16 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from densarm.arms.arm import Arm
-from densarm.density.goal_distance import GoalDistance, TorusDistance
+from densarm.density.goal_distance import TorusDistance
 from densarm.density.navigation_density import DensityParameters
-from densarm.density.sub_goals import GuidedDensity, GuidePath, SubGoals
+from densarm.density.sub_goals import GuidePath
 from densarm.density.unsafe_sets import SensingParameters
 from densarm.errors import InvalidValueError
-from densarm.planning.guide import Guide, NoPath
-from densarm.planning.integral_curve import IntegralCurve, integral_curve
+from densarm.planning.density_guide import DensityGuide, PlanningSystem
+from densarm.planning.guide import Guide, NoPath, PlanningParameters
 from densarm.planning.motion import Motion, PlanningError, TimingParameters
-from densarm.planning.path_guide import PathGuide, PathGuideParameters, shortcut
+from densarm.planning.path_guide import PathGuide
+from densarm.planning.shortening import shortened
 from densarm.values.arrays import Array
 from densarm.values.checks import non_negative, non_negative_integer, one_of
 from densarm.values.outcome import Outcome
@@ -27,8 +28,9 @@ from densarm.world.stopping import StoppingCheck, StoppingTrajectory
 from densarm.world.swept_check import SweptCheck
 from densarm.world.world import World
 
-GUIDES = ("path", "direct")
-"""Names of guides: a collision-free path by OMPL, or the goal alone, as in [ZNV]."""
+GUIDES = ("auto", "density", "direct", "path")
+"""Names of guides: "density" is `DensityGuide`; "path" is `PathGuide`, a collision-free path by
+OMPL; "auto" the second where the first finds none; "direct" the goal alone, as in [ZNV]."""
 
 PATH_MARGIN = 0.02
 """Distance that paths keep beyond m, less in narrow spaces and near start and goal [m]."""
@@ -51,9 +53,8 @@ _ATTEMPTS = ((1.0, 0.02), (0.25, 1.0), (0.05, 1.0))
 _AT_GOAL = 1e-7  # [rad or m]; a shorter way is left to feedback, for rounding shapes its curve
 
 _END_SHARE = 0.5  # of the clearance at start and goal that a path's margin may take
-_SMOOTH_SHARE = 0.5  # of a path's or curve's distance margin that the smooth path keeps
-_ROOMY = 0.03  # [m] beyond the margin, where chords may cut a curve short
-_LEAST_KEPT = 1e-4  # [m], less than which a smooth path keeps nothing
+_SMOOTH_SHARE = 0.8  # of what a path keeps that the smooth path near it keeps
+_HALVINGS = 7  # of what a path keeps, until that is proved
 _STOP_SHARE = 0.5  # of the smooth path's that stopping keeps too; the rest is for tracking errors
 
 
@@ -63,8 +64,9 @@ class PlannedPath:
 
     path: GuidePath
     """The sub-goals."""
-    distance_margin: float
-    """Distance that the path keeps beyond the safety margin [m]."""
+    kept: Array
+    """Distance of each pair that the path keeps beyond the safety margin (K,) [m]; of sub-goals
+    that are not proved clear, what it shall keep."""
     plan_time: float
     """Wall-clock time that the guide took [s]; zero for the direct guide."""
 
@@ -73,7 +75,7 @@ def plan_motion(
     world: World,
     start: ArrayLike,
     goal: ArrayLike,
-    guide: str | Guide = "path",
+    guide: str | Guide = "auto",
     *,
     margin: float = 0.0,
     seed: int = 0,
@@ -83,7 +85,7 @@ def plan_motion(
     period: float = 0.001,
     density: DensityParameters = DensityParameters(),
     sensing: SensingParameters = SensingParameters(),
-    search: PathGuideParameters = PathGuideParameters(),
+    search: PlanningParameters = PlanningParameters(),
     timing: TimingParameters = TimingParameters(),
     time_limit: float = math.inf,
 ) -> Motion:
@@ -97,7 +99,7 @@ def plan_motion(
         world: the arm among obstacles.
         start: configuration (nq,).
         goal: configuration (nq,).
-        guide: supplies the sub-goals: "path", "direct" or a `Guide`.
+        guide: supplies the sub-goals: one of `GUIDES`, or a `Guide`.
         margin: safety margin m [m]; it must hold at start and goal too.
         seed: of the guide's random choices.
         path_margin: distance that paths keep beyond m [m].
@@ -114,25 +116,26 @@ def plan_motion(
         PlanningError: there is no motion, with the outcome and the reason.
         InvalidValueError: no configuration, an unknown guide, or a value out of its range.
     """
-    planned = plan_path(
-        world, start, goal, guide, margin=margin, seed=seed, path_margin=path_margin, search=search
-    )
-    path, check = planned.path, SweptCheck(world, margin)
+    check = SweptCheck(world, margin)
     distance = TorusDistance(world.arm, kappa=kappa)
-    curve = _curve(check, path, distance, replace(density, alpha=alpha), sensing)
-    points = np.vstack([start, curve.q])
-    kept = _SMOOTH_SHARE * planned.distance_margin
-    if not path.is_clear:
-        points, kept = _shortened(world, margin, kept, points, search, seed)
+    system = PlanningSystem(check, distance, replace(density, alpha=alpha), sensing)
+    planned = _planned(system, start, goal, guide, seed, path_margin, search)
+    points, kept, stuck = planned.path.waypoints, planned.kept, ""
+    if not planned.path.is_clear:
+        curve = system.curve_from_either_end(planned.path)
+        space, rng = SeparatingPlanes(world, margin, kept), np.random.default_rng(seed)
+        points = shortened(world.arm, space, curve.q, search.shortcuts, rng)
+        kept, stuck = _kept_along(check, points, kept), curve.detail
+    points, kept = np.vstack([start, points]), _SMOOTH_SHARE * kept
     motion = replace(
         _timed(world, margin, kept, points, period, timing, time_limit),
         margin=margin,
-        path=path,
+        path=planned.path,
         plan_time=planned.plan_time,
-        detail=curve.detail,
+        detail=stuck,
     )
-    if not curve.reached:
-        raise PlanningError(Outcome.STUCK, curve.detail, motion)
+    if stuck:
+        raise PlanningError(Outcome.STUCK, stuck, motion)
     return motion
 
 
@@ -140,69 +143,115 @@ def plan_path(
     world: World,
     start: ArrayLike,
     goal: ArrayLike,
-    guide: str | Guide = "path",
+    guide: str | Guide = "auto",
     *,
     margin: float = 0.0,
     seed: int = 0,
     path_margin: float = PATH_MARGIN,
-    search: PathGuideParameters = PathGuideParameters(),
+    alpha: float = PLANNING_ALPHA,
+    kappa: float = 1.0,
+    density: DensityParameters = DensityParameters(),
+    sensing: SensingParameters = SensingParameters(),
+    search: PlanningParameters = PlanningParameters(),
 ) -> PlannedPath:
     """Plan sub-goals alone, for a controller that follows them without a timed motion.
 
     Args and errors as for `plan_motion`.
     """
-    arm, check = world.arm, SweptCheck(world, margin)
+    distance = TorusDistance(world.arm, kappa=kappa)
+    leading = replace(density, alpha=alpha)
+    system = PlanningSystem(SweptCheck(world, margin), distance, leading, sensing)
+    return _planned(system, start, goal, guide, seed, path_margin, search)
+
+
+def _planned(
+    system: PlanningSystem,
+    start: ArrayLike,
+    goal: ArrayLike,
+    guide: str | Guide,
+    seed: int,
+    path_margin: float,
+    search: PlanningParameters,
+) -> PlannedPath:
+    check = system.check
+    world, arm, margin = check.world, check.arm, check.margin
     start, goal = arm.check_configuration("start", start), arm.check_configuration("goal", goal)
     non_negative_integer("seed", seed)
+    non_negative("path_margin", path_margin)
     if isinstance(guide, str):
         one_of("guide", guide, GUIDES)
     if fault := infeasibility(check, {"start": start, "goal": goal}):
         raise PlanningError(Outcome.INFEASIBLE, fault)
     depart, arrive = (inside_limits(check, q) for q in (start, goal))
-    ends = check.least_distance_margin(np.stack([start, depart, arrive]))
-    least = max(0.0, _END_SHARE * ends)
-    kept = min(non_negative("path_margin", path_margin), least)
-    if guide == "path":
-        return _searched(world, margin, depart, arrive, path_margin, least, search, seed)
-    if isinstance(guide, str):
+    ends = np.min([check.distance_margin(q) for q in (start, depart, arrive)], axis=0)
+    least = np.maximum(0.0, _END_SHARE * ends)
+    kept = np.minimum(path_margin, least)
+    if guide == "direct":
         # Not claimed to be clear: the density bends around what blocks it, or gets stuck there.
         return PlannedPath(GuidePath(np.stack([depart, arrive]), is_clear=False), kept, 0.0)
     began = time.perf_counter()
-    path = _checked(arm, guide.plan(depart, arrive, seed), depart, arrive)
-    elapsed = time.perf_counter() - began
-    if path.is_clear:
-        kept = min(kept, max(0.0, check.least_distance_margin(path.waypoints)))
-    return PlannedPath(path, kept, elapsed)
+    answer: GuidePath | NoPath
+    if guide == "path":
+        path, kept = _searched(check, depart, arrive, path_margin, least, search, seed)
+    elif isinstance(guide, str):
+        space = SeparatingPlanes(world, margin, kept)
+        answer = DensityGuide(system, space, search).plan(depart, arrive, seed)
+        if isinstance(answer, GuidePath):
+            path, kept = answer, _kept_along(check, answer.waypoints, kept)
+        elif guide == "density":
+            raise PlanningError(Outcome.STUCK, answer.reason)
+        else:
+            path, kept = _searched(check, depart, arrive, path_margin, least, search, seed)
+            path = replace(path, stuck=answer.reason)
+    else:
+        path = _checked(arm, guide.plan(depart, arrive, seed), depart, arrive)
+        if path.is_clear:
+            kept = _kept_along(check, path.waypoints, kept)
+    return PlannedPath(path, kept, time.perf_counter() - began)
 
 
 def _searched(
-    world: World,
-    margin: float,
+    check: SweptCheck,
     start: Array,
     goal: Array,
     path_margin: float,
-    least: float,
-    search: PathGuideParameters,
+    least: Array,
+    search: PlanningParameters,
     seed: int,
-) -> PlannedPath:
-    """Search a path under ever smaller margins; `least` of both ends bounds them [m]."""
-    # Of attempts with the same margin the last counts, which is the most thorough.
-    attempts = {min(share * path_margin, least): effort for share, effort in _ATTEMPTS}
-    spaces = {kept: SeparatingPlanes(world, margin + kept) for kept in attempts}
-    began = time.perf_counter()
-    for kept, effort in attempts.items():
+) -> tuple[GuidePath, Array]:
+    """Search a path that keeps ever less (K,) [m], of each pair at most so much."""
+    attempts: list[tuple[Array, float]] = []
+    for share, effort in _ATTEMPTS:
+        kept = np.minimum(share * path_margin, least)
+        if attempts and np.array_equal(kept, attempts[-1][0]):
+            attempts.pop()  # of those that keep the same the last is the most thorough
+        attempts.append((kept, effort))
+    for kept, effort in attempts:
         parameters = search
-        if kept > min(attempts):
+        if kept is not attempts[-1][0]:
             parameters = replace(search, searches=math.ceil(0.5 * search.searches))
         if effort < 1.0:
             iterations = math.ceil(effort * search.iterations)
             parameters = replace(search, iterations=iterations, near_share=1.0, searches=1)
-        path = PathGuide(world.arm, spaces[kept], parameters).plan(start, goal, seed)
+        space = SeparatingPlanes(check.world, check.margin, kept)
+        path = PathGuide(check.arm, space, parameters).plan(start, goal, seed)
         if isinstance(path, GuidePath):
-            return PlannedPath(path, kept, time.perf_counter() - began)
+            return path, kept
         reason = path.reason
-    tried = ", ".join(f"{1e3 * (margin + kept):.3g}" for kept in attempts)
+    tried = ", ".join(f"{1e3 * (check.margin + kept.max(initial=0.0)):.3g}" for kept, _ in attempts)
     raise PlanningError(Outcome.NO_PATH, f"{reason}, with margins of {tried} mm")
+
+
+def _kept_along(check: SweptCheck, points: Array, kept: Array) -> Array:
+    """Return how much of what pairs shall keep (K,) [m] is proved along a polyline (N, nq)."""
+    met = np.min([check.distance_margin(q) for q in points], axis=0)
+    kept = np.clip(met, 0.0, kept)
+    for _ in range(_HALVINGS):
+        space = SeparatingPlanes(check.world, check.margin, kept)
+        if all(space.segment_is_clear(a, b) for a, b in pairwise(points)):
+            return kept
+        kept = 0.5 * kept
+    return np.zeros_like(kept)
 
 
 def _checked(arm: Arm, answer: object, start: Array, goal: Array) -> GuidePath:
@@ -226,62 +275,16 @@ def _checked(arm: Arm, answer: object, start: Array, goal: Array) -> GuidePath:
     return GuidePath(np.array(checked), bool(answer.is_clear))
 
 
-def _curve(
-    check: SweptCheck,
-    path: GuidePath,
-    goal_distance: GoalDistance,
-    parameters: DensityParameters,
-    sensing: SensingParameters,
-) -> IntegralCurve:
-    """Return the planning system's curve.
-
-    On a path that is proved clear nothing is sensed, the sensing distances being below the
-    path's own clearance: the density leads from each sub-goal straight to the next.
-    """
-    if path.is_clear:
-        return IntegralCurve(path.waypoints, reached=True, detail="")
-
-    def from_end(path: GuidePath) -> IntegralCurve:
-        guided = GuidedDensity(check, SubGoals(check, path, sensing), goal_distance, parameters)
-        return integral_curve(guided, check.margin, path.waypoints[0])
-
-    curve = from_end(path)
-    if not curve.reached:
-        # A goal lies in narrow space more often than a start, and leaving is easier than entering.
-        returned = from_end(GuidePath(path.waypoints[::-1], is_clear=False))
-        if returned.reached:
-            return replace(returned, q=returned.q[::-1])
-    return curve
-
-
-def _shortened(
-    world: World, margin: float, kept: float, points: Array, search: PathGuideParameters, seed: int
-) -> tuple[Array, float]:
-    """Return a shorter polyline (N, nq), and the distance that a smooth path near it may keep [m].
-
-    The chords of a curve that climbs among obstacles are proved clear beyond the margin alone.
-    """
-    rng = np.random.default_rng(seed)
-    roomy = SeparatingPlanes(world, margin + _ROOMY)
-    points = shortcut(world.arm, roomy, points, search.shortcuts, rng)
-    while kept > _LEAST_KEPT:
-        space = SeparatingPlanes(world, margin + kept)
-        if all(space.segment_is_clear(a, b) for a, b in pairwise(points)):
-            return points, _SMOOTH_SHARE * kept
-        kept *= 0.5
-    return points, 0.0
-
-
 def _timed(
     world: World,
     margin: float,
-    kept: float,
+    kept: Array,
     curve: Array,
     period: float,
     timing: TimingParameters,
     time_limit: float,
 ) -> Motion:
-    """Return a smooth motion near a curve (N, nq) that keeps so much beyond the margin [m]."""
+    """Return a smooth motion near a curve (N, nq) that keeps so much beyond the margin (K,) [m]."""
     arm = world.arm
     length = float(np.linalg.norm(arm.difference(curve[:-1], curve[1:]), axis=1).sum())
     if length < _AT_GOAL:
@@ -291,12 +294,12 @@ def _timed(
     from densarm.planning.smoothing import smooth_path
     from densarm.planning.timing import time_path
 
-    path = smooth_path(world, margin + kept, curve)
+    path = smooth_path(world, margin, curve, kept)
     if path is None:
         reason = "no smooth path near the planning system's curve is proved clear"
         raise PlanningError(Outcome.NO_PATH, reason)
     stops = StoppingTrajectory(arm, timing.acceleration_share, timing.torque_share)
-    stopping = StoppingCheck(world, stops, margin + _STOP_SHARE * kept)
+    stopping = StoppingCheck(world, stops, margin, _STOP_SHARE * kept)
     return time_path(arm, path, length, period, timing, stopping, time_limit)
 
 

@@ -11,6 +11,7 @@ from ompl import util as ou
 
 from densarm.arms.arm import Arm
 from densarm.planning.guide import FreeSpace
+from densarm.planning.sampling import Bounds
 from densarm.values.arrays import Array
 
 
@@ -20,7 +21,7 @@ def rrt_connect(
     start: Array,
     goal: Array,
     *,
-    bounds: tuple[Array, Array],
+    bounds: Bounds,
     iterations: int,
     extension: float,
     seed: int,

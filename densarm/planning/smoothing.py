@@ -58,8 +58,12 @@ class SmoothPath:
         return self.knots[order : len(self.knots) - order]
 
 
-def smooth_path(world: World, margin: float, curve: Array) -> SmoothPath | None:
-    """Return a C² path with the ends of a polyline (N, nq), proved clear beyond a margin [m].
+def smooth_path(
+    world: World, margin: float, curve: Array, kept: float | Array = 0.0
+) -> SmoothPath | None:
+    """Return a C² path with the ends of a polyline (N, nq), proved clear.
+
+    It is clear beyond the margin [m] and what each pair, or all, keep beyond that (K,) [m].
 
     Control points of a clamped uniform cubic B-spline are taken from the polyline at equal
     distances. Each piece of the spline stays in the convex hull of four of them, so that it tends
@@ -72,7 +76,7 @@ def smooth_path(world: World, margin: float, curve: Array) -> SmoothPath | None:
     steps = arm.difference(curve[:-1], curve[1:])
     corner = arm.angles(curve[0]) + np.vstack([np.zeros(arm.nv), np.cumsum(steps, axis=0)])
     length = np.append(0.0, np.cumsum(np.linalg.norm(steps, axis=1)))
-    proof = _MotionProof(world, margin)
+    proof = _MotionProof(world, margin, kept)
     for halving in range(_HALVINGS):
         count = max(_DEGREE + 1, 1 + int(np.ceil(length[-1] * 2.0**halving / _WIDEST)))
         at = np.linspace(0.0, length[-1], count)
@@ -107,9 +111,9 @@ class _MotionProof:
     A chord in no tube that is proved clear is left to `SweptCheck` and its exact distances.
     """
 
-    def __init__(self, world: World, margin: float) -> None:
-        self._planes = SeparatingPlanes(world, margin)
-        self._swept = SweptCheck(world, margin)
+    def __init__(self, world: World, margin: float, kept: float | Array) -> None:
+        self._planes = SeparatingPlanes(world, margin, kept)
+        self._swept = SweptCheck(world, margin, kept)
 
     def verdict(self, angles: Array, departure: Array) -> SweptVerdict:
         """Return whether the motion through joint positions (N, nv) [rad or m] is proved clear.

@@ -56,7 +56,7 @@ def run(
 
     Args:
         scenario: what to run: a `Scenario`, a known name, or the path of a TOML file.
-        guide: "path", "direct" or a `Guide`; None for the scenario's own.
+        guide: one of `GUIDES`, or a `Guide`; None for the scenario's own.
         seed: of the guide's random choices; None for the scenario's own.
         on_progress: told what is being done.
 
@@ -138,6 +138,7 @@ def _plan(scenario: Scenario, start: Array, guide: Guide | None) -> Drive:
         "search": scenario.planning,
     }
     law: dict[str, Any] = {"density": scenario.density, "sensing": scenario.sensing}
+    search |= {**law, "alpha": control.planning_alpha, "kappa": control.kappa}
     distance = TorusDistance(scenario.arm, kappa=control.kappa)
     if control.form in {ControlForm.REGULATION, ControlForm.PLAIN}:
         planned = plan_path(world, start, goal, chosen, **search)
@@ -162,9 +163,6 @@ def _plan(scenario: Scenario, start: Array, guide: Guide | None) -> Drive:
             goal,
             chosen,
             **search,
-            **law,
-            alpha=control.planning_alpha,
-            kappa=control.kappa,
             period=period,
             timing=scenario.timing,
             time_limit=scenario.simulation.time_limit,

@@ -20,8 +20,8 @@ from densarm.density.goal_distance import KAPPA_MIN
 from densarm.density.navigation_density import DensityParameters
 from densarm.density.unsafe_sets import SensingParameters
 from densarm.errors import DensarmError, FileContentError, InvalidValueError, UnknownNameError
+from densarm.planning.guide import PlanningParameters
 from densarm.planning.motion import TimingParameters
-from densarm.planning.path_guide import PathGuideParameters
 from densarm.planning.plan import GUIDES, PATH_MARGIN, PLANNING_ALPHA
 from densarm.scene.loading import parse_scene
 from densarm.scene.scene import Scene
@@ -63,8 +63,8 @@ class ControlParameters:
 
     form: ControlForm = ControlForm.TRACKING
     """The controller."""
-    guide: str = "path"
-    """The guide, unless the caller names another: "path" or "direct"."""
+    guide: str = "auto"
+    """The guide, unless the caller names another: "auto", "density", "direct" or "path"."""
     margin: float = 0.0
     """Safety margin m: a pair is unsafe at this distance and below [m]."""
     path_margin: float = PATH_MARGIN
@@ -113,7 +113,7 @@ class Scenario:
     """The density that feeds back."""
     sensing: SensingParameters = field(default_factory=SensingParameters)
     """From where on it senses obstacles and limits."""
-    planning: PathGuideParameters = field(default_factory=PathGuideParameters)
+    planning: PlanningParameters = field(default_factory=PlanningParameters)
     """How long and how finely a path is searched."""
     timing: TimingParameters = field(default_factory=TimingParameters)
     """Shares of the limits that a motion may use."""
@@ -178,7 +178,7 @@ TABLES: Mapping[str, type[Any]] = {
     "control": ControlParameters,
     "density": DensityParameters,
     "sensing": SensingParameters,
-    "planning": PathGuideParameters,
+    "planning": PlanningParameters,
     "timing": TimingParameters,
     "speed": SpeedParameters,
     "gains": Gains,

@@ -11,9 +11,9 @@ import pinocchio as pin
 from densarm.arms.arm import Arm
 from densarm.arms.dynamics import holding_ratios
 from densarm.errors import DensarmError
-from densarm.planning.guide import GuidePath
+from densarm.planning.guide import GuidePath, PlanningParameters
 from densarm.planning.motion import TimingParameters
-from densarm.planning.path_guide import PathGuide, PathGuideParameters
+from densarm.planning.path_guide import PathGuide
 from densarm.scene.loading import MotionProblem
 from densarm.scene.obstacles import Box, Sphere
 from densarm.scene.scene import Scene
@@ -26,7 +26,7 @@ from densarm.world.world import World
 _SCENES = 200  # drawn for one problem at most
 _DRAWS = 3000  # of one end in one scene
 _CHECKS = 300  # of those, where the end effector is in its region
-_BUDGET = PathGuideParameters(iterations=100_000, near_share=0.0, searches=1, shortcuts=1)
+_BUDGET = PlanningParameters(iterations=100_000, near_share=0.0, searches=1, shortcuts=1)
 _SAMPLES = 1000  # configurations that tell the reach
 _BODIES = (3, 8)  # spheres or boxes in a scene, the last number not included
 # Lengths are in units of the reach.

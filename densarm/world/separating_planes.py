@@ -69,16 +69,18 @@ class SeparatingPlanes:
     Args:
         world: the pairs.
         margin: distance that must be exceeded for a pair to count as apart [m].
+        kept: how much more that is for each pair (K,), or for all [m].
 
     Raises:
         InvalidValueError: a negative margin.
     """
 
-    def __init__(self, world: World, margin: float = 0.0) -> None:
+    def __init__(self, world: World, margin: float = 0.0, kept: float | Array = 0.0) -> None:
         self._world = world
         self._version = world.version
         self._bodies, some_corner = bodies_of(world)
-        self._least = np.full(world.n_pairs, non_negative("margin", margin) + DISTANCE_TOLERANCE)
+        least = non_negative("margin", margin) + DISTANCE_TOLERANCE
+        self._least = np.full(world.n_pairs, least) + kept
         corners = np.full((world.n_pairs, 4, 2), -1)
         corners[:, 0] = some_corner
         self._memory = _Memory(corners, np.flatnonzero(world.changes > 0))

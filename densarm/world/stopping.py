@@ -138,12 +138,19 @@ class StoppingCheck:
         world: the pairs, and the Lipschitz constants r_kj of their distances.
         stopping: how the arm stops.
         margin: distance that must be exceeded for a pair to count as apart [m].
+        kept: how much more that is for each pair (K,), or for all [m].
     """
 
-    def __init__(self, world: World, stopping: StoppingTrajectory, margin: float = 0.0) -> None:
+    def __init__(
+        self,
+        world: World,
+        stopping: StoppingTrajectory,
+        margin: float = 0.0,
+        kept: float | Array = 0.0,
+    ) -> None:
         self._arm = world.arm
         self._stopping = stopping
-        self._planes = SeparatingPlanes(world, margin)
+        self._planes = SeparatingPlanes(world, margin, kept)
 
     def check(self, q: Array, v: Array) -> StoppingResult:
         """Return from which samples stopping is proved.

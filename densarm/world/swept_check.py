@@ -56,24 +56,28 @@ class SweptCheck:
     Args:
         world: the pairs.
         margin: distance that must be exceeded for a pair to count as apart [m].
+        kept: how much more that is for each pair (K,), or for all [m].
 
     Raises:
         InvalidValueError: a negative margin.
     """
 
-    def __init__(self, world: World, margin: float = 0.0) -> None:
+    def __init__(self, world: World, margin: float = 0.0, kept: float | Array = 0.0) -> None:
         self.world = world
         self.arm = world.arm
         self.margin = non_negative("margin", margin)
+        self._least = np.full(world.n_pairs, margin + DISTANCE_TOLERANCE) + kept
 
     def distance_margin(self, q: Array, pairs: Pairs | None = None) -> Array:
-        """Return by how much distances surely exceed the margin [m].
+        """Return by how much distances surely exceed the margin, and what is kept beyond [m].
 
         Args:
             q: configuration (nq,).
             pairs: indices of the pairs to look at; None for all, (K,).
         """
-        return self.world.distances(q, pairs) - (self.margin + DISTANCE_TOLERANCE)
+        return self.world.distances(q, pairs) - (
+            self._least if pairs is None else self._least[pairs]
+        )
 
     def least_distance_margin(self, q: Array) -> float:
         """Return the smallest distance margin [m] at configurations (N, nq); infinite of none."""
@@ -134,7 +138,7 @@ class SweptCheck:
 
         def margin_at(t: float, pairs: Pairs) -> Array:
             margin = self.distance_margin(line.configuration(t), pairs)
-            met[t] = float(margin.min(initial=np.inf))
+            met[t] = float((margin + self._least[pairs]).min(initial=np.inf))
             return margin
 
         margin_a, margin_b = margin_at(0, every), margin_at(line.end, every)
@@ -165,8 +169,7 @@ class SweptCheck:
         self, verdict: SweptVerdict, met: dict[float, float], at: float, failing: Pairs
     ) -> SweptResult:
         pairs = tuple(self.world.pairs[k] for k in failing)
-        distance = min(met.values()) + self.margin + DISTANCE_TOLERANCE
-        return SweptResult(verdict, int(at), pairs, np.unique(list(met)), distance)
+        return SweptResult(verdict, int(at), pairs, np.unique(list(met)), min(met.values()))
 
 
 class _Polyline:

@@ -16,7 +16,7 @@ from densarm.arms.arm import Arm, load_arm
 from densarm.arms.joints import POSITION_TOLERANCE
 from densarm.errors import InvalidValueError
 from densarm.planning.guide import FreeSpace, GuidePath, NoPath
-from densarm.planning.path_guide import PathGuide, PathGuideParameters, shortcut
+from densarm.planning.path_guide import PathGuide, PlanningParameters, shortcut
 from densarm.scene.obstacles import Box, Sphere
 from densarm.scene.scene import Scene
 from densarm.values.arrays import Array
@@ -54,7 +54,7 @@ def test_every_edge_of_a_path_is_clear(
 ) -> None:
     world = make_discs(arm, *discs)
     q_start, q_goal = arm.configuration(start), arm.configuration(goal)
-    answer = PathGuide(arm, world, PathGuideParameters(iterations=200, searches=2)).plan(
+    answer = PathGuide(arm, world, PlanningParameters(iterations=200, searches=2)).plan(
         q_start, q_goal, seed
     )
     if isinstance(answer, NoPath):
@@ -124,7 +124,7 @@ def test_bounded_revolute_joints_do_not_wrap(
 def test_an_enclosed_goal_has_no_path(
     arm: Arm, make_discs: Discs, enclosure: list[tuple[float, float, float]]
 ) -> None:
-    parameters = PathGuideParameters(iterations=100, searches=2)
+    parameters = PlanningParameters(iterations=100, searches=2)
     guide = PathGuide(arm, make_discs(arm, *enclosure), parameters)
     answer = guide.plan(arm.configuration([-2.0, 0.0]), arm.configuration([0.0, 0.0]), 0)
     assert isinstance(answer, NoPath)
@@ -161,7 +161,7 @@ def test_later_searches_add_longer_edges(
     arm: Arm, make_discs: Discs, enclosure: list[tuple[float, float, float]]
 ) -> None:
     watched = Watched(arm, make_discs(arm, *enclosure))
-    parameters = PathGuideParameters(iterations=100, searches=2, extension=0.3)
+    parameters = PlanningParameters(iterations=100, searches=2, extension=0.3)
     ends = arm.configuration([-2.0, 0.0]), arm.configuration([0.0, 0.0])
     PathGuide(arm, watched, parameters).plan(*ends, 0)
     lengths = watched.lengths
@@ -176,7 +176,7 @@ def test_the_first_samples_are_near_both_ends(
 ) -> None:
     arm = make_arm("revolute", "revolute")
     watched = Watched(arm, make_discs(arm, *enclosure))
-    parameters = PathGuideParameters(100, near_share=0.1, near_distance=0.4, searches=1)
+    parameters = PlanningParameters(100, near_share=0.1, near_distance=0.4, searches=1)
     ends = arm.configuration([-2.0, 0.0]), arm.configuration([0.0, 0.0])
     PathGuide(arm, watched, parameters).plan(*ends, 0)
     middle, half = np.array([-1.0, 0.0]), np.array([1.0, 0.0])
@@ -193,7 +193,7 @@ def test_continuous_joints_are_near_across_the_seam(
     arm = make_arm("continuous", "revolute")
     watched = Watched(arm, make_discs(arm, (np.pi, 0.0, 0.2)))
     start, goal = arm.configuration([2.9, 0.0]), arm.configuration([-2.9, 0.0])
-    parameters = PathGuideParameters(16, near_share=1.0, near_distance=0.4, searches=1)
+    parameters = PlanningParameters(16, near_share=1.0, near_distance=0.4, searches=1)
     assert isinstance(PathGuide(arm, watched, parameters).plan(start, goal, 0), GuidePath)
     off_seam = np.abs(np.mod(watched.ends[..., 0], 2.0 * np.pi) - np.pi)
     assert 0.25 < off_seam.max() <= np.pi - 2.9 + 0.4 + 1e-9
@@ -205,7 +205,7 @@ def test_near_a_whole_turn_is_anywhere(make_arm: Callable[..., Arm], make_discs:
     world = make_discs(arm, *[(np.pi, y, 0.4) for y in np.arange(-3.0, 3.1, 0.5)])
     start, goal = arm.configuration([2.5, 0.0]), arm.configuration([-2.5, 0.0])
     for distance, answer in ((0.4, NoPath), (3.0, GuidePath)):
-        parameters = PathGuideParameters(16, 1.0, near_distance=distance, searches=1)
+        parameters = PlanningParameters(16, 1.0, near_distance=distance, searches=1)
         assert isinstance(PathGuide(arm, world, parameters).plan(start, goal, 0), answer)
 
 
@@ -215,7 +215,7 @@ def test_what_is_not_found_soon_near_both_ends_is_searched_everywhere(
     """The way round the wall is not near: all of few samples find none, nor do many for long."""
     arm = make_arm("revolute", "revolute")
     wall = make_discs(arm, (0.0, 0.0, 0.6), (0.0, 1.0, 0.6), (0.3, -0.9, 0.4))
-    few, many = (PathGuideParameters(n, 1.0, near_distance=0.5, searches=1) for n in (16, 500))
+    few, many = (PlanningParameters(n, 1.0, near_distance=0.5, searches=1) for n in (16, 500))
     assert isinstance(PathGuide(arm, wall, few).plan(*ends(arm), 0), NoPath)
     assert wall.segments < 100
     assert isinstance(PathGuide(arm, wall, many).plan(*ends(arm), 0), GuidePath)
@@ -268,13 +268,13 @@ def test_a_joint_without_an_interval_is_refused(
 )
 def test_parameters_are_positive(field: str) -> None:
     with pytest.raises(InvalidValueError, match=field):
-        PathGuideParameters(**{field: 0})
+        PlanningParameters(**{field: 0})
 
 
 @pytest.mark.parametrize("share", [-0.1, 1.1, np.nan])
 def test_a_share_outside_its_interval_is_refused(share: float) -> None:
     with pytest.raises(InvalidValueError, match=r"near_share.*\[0, 1\]"):
-        PathGuideParameters(near_share=share)
+        PlanningParameters(near_share=share)
 
 
 @pytest.mark.parametrize("answers", [1, 3, 5, 10])
@@ -304,13 +304,14 @@ sys.path.insert(0, {folder!r})
 from conftest import DiscWorld, _two_joint_arm
 import numpy as np
 from densarm.planning.guide import NoPath
-from densarm.planning.path_guide import PathGuide, PathGuideParameters
+from densarm.planning.guide import PlanningParameters
+from densarm.planning.path_guide import PathGuide
 arm = _two_joint_arm(("continuous", "prismatic"), 3.0)
 world = DiscWorld(arm, np.array([[0.0, 0.0]]), np.array([0.8]))
 q = arm.configuration
 path = PathGuide(arm, world).plan(q([-1.5, 0.0]), q([1.5, 0.0]), 7)
 world.centers, world.radii = np.array([[x, 1.5] for x in range(-4, 4)]), np.full(8, 0.8)
-parameters = PathGuideParameters(iterations=50, searches=1)
+parameters = PlanningParameters(iterations=50, searches=1)
 assert isinstance(PathGuide(arm, world, parameters).plan(q([0, 0]), q([0, 2.9]), 7), NoPath)
 print(path.waypoints.tobytes().hex())
 """

@@ -17,10 +17,10 @@ from densarm.density.navigation_density import DensityParameters
 from densarm.density.sub_goals import GuidedDensity, SubGoals
 from densarm.density.unsafe_sets import SensingParameters
 from densarm.errors import InvalidValueError
-from densarm.planning.guide import FreeSpace, GuidePath, NoPath
+from densarm.planning.guide import FreeSpace, GuidePath, NoPath, PlanningParameters
 from densarm.planning.integral_curve import IntegralCurve, integral_curve
 from densarm.planning.motion import Motion, PlanningError, TimingParameters
-from densarm.planning.path_guide import PathGuide, PathGuideParameters
+from densarm.planning.path_guide import PathGuide
 from densarm.planning.plan import PATH_MARGIN, PLANNING_ALPHA, plan_motion, plan_path
 from densarm.scenarios.scenario import Scenario, load_scenario
 from densarm.scene.obstacles import Box, Obstacle, Sphere
@@ -110,12 +110,12 @@ def test_half_of_the_searches_are_made_under_all_margins_but_the_last(
     made: list[tuple[int, int]] = []
 
     class Watched(PathGuide):
-        def __init__(self, arm: Arm, freedom: FreeSpace, parameters: PathGuideParameters) -> None:
+        def __init__(self, arm: Arm, freedom: FreeSpace, parameters: PlanningParameters) -> None:
             made.append((parameters.iterations, parameters.searches))
             super().__init__(arm, freedom, parameters)
 
     monkeypatch.setattr("densarm.planning.plan.PathGuide", Watched)
-    search = PathGuideParameters(iterations=100, searches=3)
+    search = PlanningParameters(iterations=100, searches=3)
     why_not(fenced_in.world, fenced_in.start, fenced_in.goal, search=search)
     assert made == [(2, 1), (100, 2), (100, 3)]
 
@@ -442,7 +442,7 @@ def test_the_direct_guide_is_one_whose_only_sub_goal_is_the_goal(swing_up: Scena
 
 
 def test_a_short_search_is_told_apart_by_its_parameters(swing_up: Scenario) -> None:
-    search = PathGuideParameters(iterations=1, near_share=0.0, searches=1)
+    search = PlanningParameters(iterations=1, near_share=0.0, searches=1)
     error = why_not(swing_up.world, swing_up.start, swing_up.goal, search=search)
     assert error.outcome == Outcome.NO_PATH
     assert "1 searches by RRT-Connect of 1 iterations" in error.detail

@@ -1,0 +1,114 @@
+"""DensityGuide: sub-goals along integral curves of the density, by way of via points."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from densarm.density.goal_distance import GoalDistance
+from densarm.density.navigation_density import DensityParameters
+from densarm.density.sub_goals import GuidedDensity, GuidePath, SubGoals
+from densarm.density.unsafe_sets import SensingParameters
+from densarm.planning.guide import FreeSpace, NoPath, PlanningParameters
+from densarm.planning.integral_curve import IntegralCurve, integral_curve
+from densarm.planning.sampling import Bounds, SamplingBounds
+from densarm.planning.shortening import shortened
+from densarm.values.arrays import Array
+from densarm.world.swept_check import SweptCheck
+
+_DRAWN = 8  # configurations for each via point, of which it is the one with the most room
+
+
+class PlanningSystem:
+    """The density whose integral curves lead along sub-goals that nobody proved.
+
+    Args:
+        check: the world and the safety margin.
+        goal_distance: V.
+        density: θ, α and gauge.
+        sensing: sensing distances.
+    """
+
+    def __init__(
+        self,
+        check: SweptCheck,
+        goal_distance: GoalDistance,
+        density: DensityParameters,
+        sensing: SensingParameters,
+    ) -> None:
+        self.check = check
+        self._goal_distance = goal_distance
+        self._density = density
+        self._sensing = sensing
+
+    def curve(self, path: GuidePath) -> IntegralCurve:
+        """Return the curve from the first waypoint of a path towards the others in turn."""
+        sub_goals = SubGoals(self.check, path, self._sensing)
+        guided = GuidedDensity(self.check, sub_goals, self._goal_distance, self._density)
+        return integral_curve(guided, self.check.margin, path.waypoints[0])
+
+    def curve_from_either_end(self, path: GuidePath) -> IntegralCurve:
+        """As `curve`, or where that gets stuck the one from the last waypoint, gone backwards.
+
+        A goal lies in narrow space more often than a start, and leaving is easier than entering.
+        """
+        curve = self.curve(path)
+        if not curve.reached:
+            returned = self.curve(replace(path, waypoints=path.waypoints[::-1]))
+            if returned.reached:
+                return replace(returned, q=returned.q[::-1])
+        return curve
+
+
+class DensityGuide:
+    """Lead by the density alone, and where that is stuck by way of a via point.
+
+    Via points are drawn near both ends and from everywhere in turn, each the one with the most
+    room of a few. From both ends the density leads to it: leaving narrow space is easier than
+    entering it. The two curves joined, and shortened, are the way.
+
+    Args:
+        system: the density that leads.
+        freedom: proves what shortens a way.
+        parameters: see `PlanningParameters`.
+    """
+
+    def __init__(
+        self, system: PlanningSystem, freedom: FreeSpace, parameters: PlanningParameters
+    ) -> None:
+        self._system = system
+        self._freedom = freedom
+        self._parameters = parameters
+
+    def plan(self, start: Array, goal: Array, seed: int) -> GuidePath | NoPath:
+        """Act as `Guide.plan`: return a chain of clear segments, or why there is none."""
+        rng = np.random.default_rng(seed)
+        alone = self._system.curve_from_either_end(_pair(start, goal))
+        if alone.reached:
+            return self._path(alone.q, rng, "the density alone")
+        bounds = SamplingBounds(self._system.check.arm, self._parameters, start, goal)
+        for index in range(self._parameters.vias):
+            via = self._via(bounds.everywhere if index % 2 else bounds.near, rng)
+            # From the narrow end first, which is where it fails more often.
+            from_goal = self._system.curve(_pair(goal, via))
+            if from_goal.reached:
+                from_start = self._system.curve(_pair(start, via))
+                if from_start.reached:
+                    way = np.vstack([from_start.q, from_goal.q[-2::-1]])
+                    found_by = f"the density by way of via point {index + 1}"
+                    return replace(self._path(way, rng, found_by), stuck=alone.detail)
+        tried = f"; from none of {self._parameters.vias} via points it leads to both ends"
+        return NoPath(alone.detail + (tried if self._parameters.vias else ""))
+
+    def _via(self, bounds: Bounds, rng: np.random.Generator) -> Array:
+        check = self._system.check
+        drawn = [check.arm.configurations(bounds.draw(rng)) for _ in range(_DRAWN)]
+        return max(drawn, key=lambda q: check.distance_margin(q).min(initial=np.inf))
+
+    def _path(self, way: Array, rng: np.random.Generator, found_by: str) -> GuidePath:
+        arm, tries = self._system.check.arm, self._parameters.shortcuts
+        path = shortened(arm, self._freedom, way, tries, rng)
+        return GuidePath(path, is_clear=True, found_by=found_by)
+
+
+def _pair(start: Array, goal: Array) -> GuidePath:
+    return GuidePath(np.stack([start, goal]), is_clear=False)
