@@ -18,7 +18,7 @@ from densarm.density.unsafe_sets import SensingParameters
 from densarm.planning.guide import NoPath
 from densarm.planning.path_guide import PathGuide
 from densarm.scenarios.run import run
-from densarm.scenarios.scenario import Scenario, load_scenario
+from densarm.scenarios.scenario import ControlParameters, Scenario, load_scenario
 from densarm.scene.obstacles import Sphere
 from densarm.scene.scene import Scene
 from densarm.simulation.run import Run
@@ -47,8 +47,13 @@ def chromium() -> str:
 
 @pytest.fixture(scope="session")
 def swing_up() -> Scenario:
-    """The two-link arm swings up between two balls."""
-    return load_scenario("swing_up")
+    """The two-link arm swings up between two balls, along a path, all parameters by default."""
+    return replace(
+        load_scenario("swing_up"),
+        control=ControlParameters(),
+        density=DensityParameters(),
+        sensing=SensingParameters(),
+    )
 
 
 @pytest.fixture(scope="session")

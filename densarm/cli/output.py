@@ -120,6 +120,8 @@ def print_run(run: Run, compiled: float) -> None:
         figures["compiled"] = f"{compiled:.1f} s, once on this machine"
     if run.tracking_error is not None:
         figures["tracking error"] = f"{run.tracking_error:.2g} rad"
+    if run.remark:
+        figures["density"] = run.remark
     if run.replanned_at:
         figures["planned again"] = ", ".join(f"at t = {time:.3f} s" for time in run.replanned_at)
     if run.task.arm.remarks:

@@ -25,6 +25,7 @@ from densarm.world.stopping import HELD_SHARE
 from densarm.world.swept_check import SweptCheck
 from densarm.world.world import World
 
+_LEAVING_SPEED = 0.1  # [rad/s] at a critical point of ρ that is no maximum
 _NEAR = 1e-3  # [rad], below which a sub-goal's pull fades
 
 
@@ -129,7 +130,7 @@ class DensityRegulation(FieldRegulation):
         period: time between two calls [s].
         goal_distance: V; None for a `TorusDistance`, or an `InertiaDistance` in the plain form.
         unsafe_sets: what else must not be entered, beside pairs of bodies and joint limits.
-        density: α, θ, gauge and blend.
+        density: α, θ, gauge and blend, and the weights of a `TorusDistance`.
         sensing: sensing distances.
         speed: parameters of the speed law.
 
@@ -166,12 +167,14 @@ class DensityRegulation(FieldRegulation):
         self.goal: Array = self._checked(goal)
         path = path or self._to_goal_alone()
         if goal_distance is None:
-            goal_distance = InertiaDistance(arm, self.goal) if plain else TorusDistance(arm)
+            weighted = TorusDistance(arm, density.weights)
+            goal_distance = InertiaDistance(arm, self.goal) if plain else weighted
         goals = SubGoals(self._check, path, sensing)
         self._guided = GuidedDensity(self._check, goals, goal_distance, density, tuple(unsafe_sets))
-        field = _DensityField(self._guided, gains.rate)
+        self._density_field = _DensityField(self._guided, gains.rate)
         inertia_at = path.waypoints[-1] if plain else None
-        super().__init__(arm, field, SpeedLaw(world, margin, speed), gains, period, inertia_at)
+        law = SpeedLaw(world, margin, speed)
+        super().__init__(arm, self._density_field, law, gains, period, inertia_at)
 
     def set_goal(self, goal: ArrayLike) -> None:
         """Lead to another goal from the next call on, without sub-goals.
@@ -184,6 +187,11 @@ class DensityRegulation(FieldRegulation):
         """
         self.goal = self._checked(goal)
         self._guided.lead_along(SubGoals(self._check, self._to_goal_alone(), self._sensing))
+
+    @property
+    def remark(self) -> str:
+        """Which critical points of ρ the arm left, and how; empty where it met none."""
+        return self._density_field.remark
 
     def describe_stall(self, q: Array) -> str:
         """Return, as a phrase, why the density leads nowhere from q (nq,), and what blocks it."""
@@ -205,6 +213,7 @@ class _DensityField:
     def __init__(self, guided: GuidedDensity, rate: float) -> None:
         self._guided, self._rate = guided, rate
         self._gradient = np.zeros(guided.world.arm.nv)
+        self.remark = ""
 
     @property
     def distances(self) -> DistanceBounds:
@@ -216,10 +225,21 @@ class _DensityField:
         guided.update(q)
         to_sub_goal, beyond = guided.way_left(q)
         if guided.is_critical():
-            return np.zeros_like(self._gradient), to_sub_goal + beyond
+            return self._leaving(q), to_sub_goal + beyond
         guided.write_gradient(q, self._gradient)
         pull = 1.0 + beyond / max(to_sub_goal, _NEAR)
         velocity = self._rate * pull * self._gradient
         if metric is not None:
             velocity = np.asarray(np.linalg.solve(metric, velocity), dtype=np.float64)
         return velocity, to_sub_goal + beyond
+
+    def _leaving(self, q: Array) -> Array:
+        """Return a velocity (nv,) away from a critical point q (nq,); zero where none leads away.
+
+        Once it is left, ∇ρ leads on.
+        """
+        direction = self._guided.unstable_direction(q)
+        if direction is None:
+            return np.zeros_like(self._gradient)
+        self.remark = self._guided.describe_departure(q, direction)
+        return _LEAVING_SPEED * direction

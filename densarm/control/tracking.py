@@ -161,6 +161,11 @@ class DensityTracking:
         """Return, as a phrase, why the arm rests short of the goal."""
         return self.motion.detail
 
+    @property
+    def remark(self) -> str:
+        """As `Motion.remark`."""
+        return self.motion.remark
+
     def _torque_by_any_distance(self, t: float, q: Array, v: Array) -> Array:
         motion, gains = self.motion, self._gains
         point = motion.sample(t, lead=0.5 * motion.period)

@@ -6,6 +6,7 @@ from enum import StrEnum
 from functools import partial
 
 import numpy as np
+from numpy.typing import NDArray
 
 from densarm.density.inverse_bump import log_inverse_bump
 from densarm.density.navigation_density import NavigationDensity
@@ -18,6 +19,8 @@ LONGEST_MOVE = 0.1
 _SEARCH_STEPS = 20
 _FARTHEST = 0.05  # [rad or m] from the arm's rest to the critical point that it rests at
 _FLAT = 1e-6  # of the pull of the goal, or [1/rad] where that is less than one
+_BESIDE = 1e-3  # [rad or m] from a critical point that a curve is led to
+_UNTOLD = 1e-9  # slope [1/rad] at and below which ∇ ln ρ tells no side of a critical point
 _NAMED = 5  # blocking members at most
 
 
@@ -75,12 +78,34 @@ def find_critical_point(
         x = x + move * min(1.0, LONGEST_MOVE / max(length, 1e-300))
         if length < 1e-14:
             break
-    hessian, coarse = log_hessian(gradient, x, step), log_hessian(gradient, x, 2.0 * step)
-    values, vectors = np.linalg.eigh(hessian)
-    eigenvalues: Array = values.astype(np.float64)
-    error = np.abs(((coarse - hessian) @ vectors * vectors).sum(axis=0))
+    eigenvalues, _, zero = _eigensystem(gradient, x, step)
     slope = float(np.linalg.norm(gradient(x)))
-    return CriticalPoint(x, slope, eigenvalues, _kind(eigenvalues, error))
+    return CriticalPoint(x, slope, eigenvalues, _kind(eigenvalues, zero))
+
+
+def unstable_direction(
+    gradient: Callable[[Array], Array], x: Array, step: float = 1e-5
+) -> Array | None:
+    """Return the direction (n,) in which ∇ ln ρ leads away the fastest from a critical point.
+
+    It is the eigenvector of the largest eigenvalue of the Hessian of ln ρ. Of both signs it has the
+    one in which ρ grows, or where that is not told by ∇ ln ρ, the one that makes the first of its
+    large entries positive. None where no eigenvalue is positive, as nothing leads away from a
+    maximum, and where by Newton's method the point is not beside a critical one.
+
+    Args:
+        gradient: points (..., n) to ∇ ln ρ there (..., n).
+        x: the point (n,) [m].
+        step: of the differences [m].
+    """
+    eigenvalues, vectors, zero = _eigensystem(gradient, x, step)
+    slope = gradient(x) @ vectors
+    off = np.linalg.norm(slope[~zero] / eigenvalues[~zero])
+    if zero[-1] or eigenvalues[-1] < 0.0 or off > _BESIDE:
+        return None
+    direction = vectors[:, -1]
+    large = direction[np.abs(direction) >= 0.5 * np.abs(direction).max()]
+    return direction * np.copysign(1.0, slope[-1] if abs(slope[-1]) > _UNTOLD else large[0])
 
 
 def log_hessian(gradient: Callable[[Array], Array], x: Array, step: float = 1e-5) -> Array:
@@ -90,9 +115,19 @@ def log_hessian(gradient: Callable[[Array], Array], x: Array, step: float = 1e-5
     return 0.5 * (hessian + hessian.T)
 
 
-def _kind(eigenvalues: Array, error: Array) -> CriticalKind:
-    """Return what eigenvalues tell whose errors to first order are given."""
-    zero = np.abs(eigenvalues) <= np.maximum(3.0 * error, 1e-9 * np.abs(eigenvalues).max())
+def _eigensystem(
+    gradient: Callable[[Array], Array], x: Array, step: float
+) -> tuple[Array, Array, NDArray[np.bool_]]:
+    """Return eigenvalues and -vectors of the Hessian of ln ρ, and which count as zero."""
+    hessian, coarse = log_hessian(gradient, x, step), log_hessian(gradient, x, 2.0 * step)
+    values, vectors = np.linalg.eigh(hessian)
+    error = np.abs(((coarse - hessian) @ vectors * vectors).sum(axis=0))
+    zero = np.abs(values) <= np.maximum(3.0 * error, 1e-9 * np.abs(values).max())
+    return values.astype(np.float64), vectors, zero
+
+
+def _kind(eigenvalues: Array, zero: NDArray[np.bool_]) -> CriticalKind:
+    """Return what eigenvalues tell, some of which count as zero."""
     rises, falls = (eigenvalues > 0.0) & ~zero, (eigenvalues < 0.0) & ~zero
     if rises.any() and falls.any():
         return CriticalKind.SADDLE

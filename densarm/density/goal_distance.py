@@ -10,11 +10,14 @@ from densarm.arms.arm import Arm
 from densarm.arms.joint_space import joint_error
 from densarm.errors import InvalidValueError
 from densarm.values.arrays import Array
-from densarm.values.checks import positive_tuple
+from densarm.values.checks import finite_vector, positive_tuple
 from densarm.values.kernels import compiled, compiled_part
 
 KAPPA_MIN = 1e-6
 """Smallest κ of `TorusDistance`, at which its product stays finite for 40 joints."""
+
+INERTIA = "inertia"
+"""Name of weights that the masses of the arm give."""
 
 
 class GoalDistance(Protocol):
@@ -66,18 +69,20 @@ class TorusDistance:
 
     Args:
         arm: its joint space.
-        weights: wᵢ > 0 [rad⁻² or m⁻²], shape (nv,); ones by default.
+        weights: wᵢ, as `joint_weights` has them.
         kappa: κ in [`KAPPA_MIN`, ∞], dimensionless.
 
     Raises:
         InvalidValueError: a weight or κ out of range.
+        RobotDescriptionError: weights by inertia, and links without a mass.
     """
 
-    def __init__(self, arm: Arm, weights: ArrayLike | None = None, kappa: float = 1.0) -> None:
+    def __init__(
+        self, arm: Arm, weights: ArrayLike | str | None = None, kappa: float = 1.0
+    ) -> None:
         if not kappa >= KAPPA_MIN:
             raise InvalidValueError("kappa", kappa, f"a number >= {KAPPA_MIN}, or infinity")
-        weights = np.ones(arm.nv) if weights is None else weights
-        self.weights = np.array(positive_tuple("weights", weights, arm.nv))
+        self.weights = joint_weights("weights", arm, weights)
         self.kappa = float(kappa)
         self._joint_index = arm.joint_index
 
@@ -86,6 +91,51 @@ class TorusDistance:
         return _evaluate_torus_distance(
             q, goal, self._joint_index, self.weights, self.kappa, out_gradient
         )
+
+
+def joint_weights(name: str, arm: Arm, weights: ArrayLike | str | None) -> Array:
+    r"""Return the weights wᵢ of a goal distance (nv,) [rad⁻² or m⁻²].
+
+    .. math:: w_i = M_{ii}(q_0) / \max_j M_{jj}(q_0)
+
+    by inertia, q_0 in the middle of what joints can do, at 0 where one has no end. What carries
+    the arm goes first then, and the rest gives way: level sets of V that are longest in the joints
+    that carry little leave the density fewer maxima beside an obstacle, where V presses against it.
+
+    Args:
+        name: what errors call the weights.
+        arm: its joint space.
+        weights: positive numbers (nv,), "inertia", or None for ones.
+
+    Raises:
+        InvalidValueError: another word, a weight that is not positive, or not one per joint.
+        RobotDescriptionError: weights by inertia, and links without a mass.
+    """
+    checked = checked_weights(name, weights)
+    if checked is None:
+        return np.ones(arm.nv)
+    if isinstance(checked, str):
+        arm.require_masses(f"{name} = {checked!r}")
+        lower, upper = arm.limits.lower, arm.limits.upper
+        ends = np.where(np.isfinite(lower) & np.isfinite(upper), [lower, upper], 0.0)
+        inertia = arm.mass_matrix(arm.configurations(ends.mean(axis=0))).diagonal()
+        checked = positive_tuple(name, inertia / inertia.max(), arm.nv)
+    return finite_vector(name, checked, arm.nv, f": one per joint, or {INERTIA!r}")
+
+
+def checked_weights(name: str, weights: ArrayLike | str | None) -> tuple[float, ...] | str | None:
+    """Return weights of a goal distance as `DensityParameters` keeps them, for any arm.
+
+    Raises:
+        InvalidValueError: another word than "inertia", or a weight that is not positive.
+    """
+    if weights is None:
+        return None
+    if isinstance(weights, str):
+        if weights != INERTIA:
+            raise InvalidValueError(name, weights, f"one number > 0 per joint, or {INERTIA!r}")
+        return weights
+    return positive_tuple(name, weights, np.size(weights))
 
 
 class ProductDistance:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from densarm.arms.joint_space import ConfigurationSpace
-from densarm.density.goal_distance import GoalDistance, TorusDistance
+from densarm.density.goal_distance import GoalDistance, TorusDistance, checked_weights
 from densarm.density.inverse_bump import smooth_step
 from densarm.density.unsafe_sets import (
     ClearanceSet,
@@ -68,8 +68,13 @@ class DensityParameters:
     """The gauge of `DensitySample.blended_gradient`, or its name."""
     blend_radius: float = 0.0
     """δ ≥ 0 of [ZNV] Remark 2, rad or m in the norm of the goal error; 0 blends nothing."""
+    weights: tuple[float, ...] | str | None = None
+    """Weights of the goal distance V, one per joint [rad⁻² or m⁻²], "inertia" for those of the
+    arm's masses, None for ones. They lead the planning system and regulation; the feedback of
+    tracking has ones, for K_p to be the same in all joints."""
 
     def __post_init__(self) -> None:
+        object.__setattr__(self, "weights", checked_weights("weights", self.weights))
         positive("alpha", self.alpha)
         non_negative("theta", self.theta)
         non_negative("blend_radius", self.blend_radius)
@@ -288,7 +293,7 @@ def density_towards(
         margin: safety margin m of the pairs [m].
         kappa: of the `TorusDistance`, where no other distance is given.
         goal_distance: V; None for a `TorusDistance`.
-        parameters: α, θ, gauge and blend.
+        parameters: α, θ, gauge, blend, and the weights of the `TorusDistance`.
         sensing: sensing distances.
 
     Raises:
@@ -300,7 +305,7 @@ def density_towards(
         ClearanceSet(world, margin, sensing.distance),
         JointLimitSet(world.arm, sensing.joint),
     ]
-    distance = goal_distance or TorusDistance(world.arm, kappa=kappa)
+    distance = goal_distance or TorusDistance(world.arm, parameters.weights, kappa)
     return NavigationDensity(world.arm, goal, unsafe, distance, parameters)
 
 

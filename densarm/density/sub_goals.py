@@ -1,10 +1,11 @@
 """Sub-goals: a chain of goals, close enough to follow, and the density towards the current one."""
 
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
-from densarm.density.critical_points import find_stall
+from densarm.density.critical_points import find_stall, unstable_direction
 from densarm.density.goal_distance import GoalDistance
 from densarm.density.navigation_density import DensityParameters, Gauge, NavigationDensity
 from densarm.density.unsafe_sets import ClearanceSet, JointLimitSet, SensingParameters, UnsafeSet
@@ -216,6 +217,29 @@ class GuidedDensity:
         gradient = self._log_gradient
         self.density.write_gradient(Gauge.LOG, gradient)
         return not np.sqrt(gradient @ gradient) > CRITICAL_SLOPE
+
+    def unstable_direction(self, q: Array) -> Array | None:
+        """Return the direction (nv,) that leads away from a critical point q (nq,), or None.
+
+        There is none at a maximum, the goal included; q was updated, and is afterwards.
+        """
+        direction = None
+        if self.density.goal_distance_value > 0.0:
+            gradients = partial(self.density.log_gradients, q)
+            direction = unstable_direction(gradients, np.zeros(self._log_gradient.size))
+            self.density.update(q)
+        return direction
+
+    def describe_departure(self, q: Array, direction: Array) -> str:
+        """Return, as a phrase, that a critical point q (nq,) is left in a direction (nv,)."""
+        where, way = (
+            ", ".join(f"{entry + 0.0:.4g}" for entry in np.round(vector, 4))
+            for vector in (self.world.arm.angles(q), direction)
+        )
+        return (
+            f"left a critical point of the density at joint positions ({where}) along its "
+            f"unstable direction ({way})"
+        )
 
     def way_left(self, q: Array) -> tuple[float, float]:
         """Return the lengths from q (nq,) to the sub-goal, and from there to the goal [rad]."""

@@ -9,7 +9,7 @@ from densarm.density.navigation_density import DensityParameters
 from densarm.density.sub_goals import GuidedDensity, GuidePath, SubGoals
 from densarm.density.unsafe_sets import SensingParameters
 from densarm.planning.guide import FreeSpace, NoPath, PlanningParameters
-from densarm.planning.integral_curve import IntegralCurve, integral_curve
+from densarm.planning.integral_curve import IntegralCurve, PlanningSystem
 from densarm.planning.sampling import Bounds, SamplingBounds
 from densarm.planning.shortening import shortened
 from densarm.values.arrays import Array
@@ -18,8 +18,8 @@ from densarm.world.swept_check import SweptCheck
 _DRAWN = 8  # configurations for each via point, of which it is the one with the most room
 
 
-class PlanningSystem:
-    """The density whose integral curves lead along sub-goals that nobody proved.
+class Legs:
+    """Integral curves of the density between configurations that nobody joined before.
 
     Args:
         check: the world and the safety margin.
@@ -39,12 +39,17 @@ class PlanningSystem:
         self._goal_distance = goal_distance
         self._density = density
         self._sensing = sensing
+        self._system: PlanningSystem | None = None
 
     def curve(self, path: GuidePath) -> IntegralCurve:
         """Return the curve from the first waypoint of a path towards the others in turn."""
         sub_goals = SubGoals(self.check, path, self._sensing)
-        guided = GuidedDensity(self.check, sub_goals, self._goal_distance, self._density)
-        return integral_curve(guided, self.check.margin, path.waypoints[0])
+        system = self._system
+        if system is None:
+            guided = GuidedDensity(self.check, sub_goals, self._goal_distance, self._density)
+            system = self._system = PlanningSystem(guided, self.check.margin)
+        system.guided.lead_along(sub_goals)
+        return system.curve(path.waypoints[0])
 
     def curve_from_either_end(self, path: GuidePath) -> IntegralCurve:
         """As `curve`, or where that gets stuck the one from the last waypoint, gone backwards.
@@ -58,6 +63,10 @@ class PlanningSystem:
                 return replace(returned, q=returned.q[::-1])
         return curve
 
+    def why_stuck(self, curve: IntegralCurve) -> str:
+        """Return, as a phrase, where a curve got stuck and what blocks it; empty if it reached."""
+        return "" if self._system is None else self._system.describe_stall(curve)
+
 
 class DensityGuide:
     """Lead by the density alone, and where that is stuck by way of a via point.
@@ -67,45 +76,53 @@ class DensityGuide:
     entering it. The two curves joined, and shortened, are the way.
 
     Args:
-        system: the density that leads.
+        legs: the density that leads.
         freedom: proves what shortens a way.
         parameters: see `PlanningParameters`.
     """
 
-    def __init__(
-        self, system: PlanningSystem, freedom: FreeSpace, parameters: PlanningParameters
-    ) -> None:
-        self._system = system
+    def __init__(self, legs: Legs, freedom: FreeSpace, parameters: PlanningParameters) -> None:
+        self._legs = legs
         self._freedom = freedom
         self._parameters = parameters
 
     def plan(self, start: Array, goal: Array, seed: int) -> GuidePath | NoPath:
         """Act as `Guide.plan`: return a chain of clear segments, or why there is none."""
         rng = np.random.default_rng(seed)
-        alone = self._system.curve_from_either_end(_pair(start, goal))
+        alone = self._alone(start, goal)
         if alone.reached:
             return self._path(alone.q, rng, "the density alone")
-        bounds = SamplingBounds(self._system.check.arm, self._parameters, start, goal)
+        stuck = self._legs.why_stuck(alone)
+        bounds = SamplingBounds(self._legs.check.arm, self._parameters, start, goal)
         for index in range(self._parameters.vias):
             via = self._via(bounds.everywhere if index % 2 else bounds.near, rng)
             # From the narrow end first, which is where it fails more often.
-            from_goal = self._system.curve(_pair(goal, via))
+            from_goal = self._legs.curve(_pair(goal, via))
             if from_goal.reached:
-                from_start = self._system.curve(_pair(start, via))
+                from_start = self._legs.curve(_pair(start, via))
                 if from_start.reached:
                     way = np.vstack([from_start.q, from_goal.q[-2::-1]])
                     found_by = f"the density by way of via point {index + 1}"
-                    return replace(self._path(way, rng, found_by), stuck=alone.detail)
+                    return replace(self._path(way, rng, found_by), stuck=stuck)
         tried = f"; from none of {self._parameters.vias} via points it leads to both ends"
-        return NoPath(alone.detail + (tried if self._parameters.vias else ""))
+        return NoPath(stuck + (tried if self._parameters.vias else ""))
+
+    def _alone(self, start: Array, goal: Array) -> IntegralCurve:
+        """Return the curve between both ends, from the one with less room first."""
+        check = self._legs.check
+        room = [check.distance_margin(q).min(initial=np.inf) for q in (start, goal)]
+        if room[0] <= room[1]:
+            return self._legs.curve_from_either_end(_pair(start, goal))
+        curve = self._legs.curve_from_either_end(_pair(goal, start))
+        return replace(curve, q=curve.q[::-1])
 
     def _via(self, bounds: Bounds, rng: np.random.Generator) -> Array:
-        check = self._system.check
+        check = self._legs.check
         drawn = [check.arm.configurations(bounds.draw(rng)) for _ in range(_DRAWN)]
         return max(drawn, key=lambda q: check.distance_margin(q).min(initial=np.inf))
 
     def _path(self, way: Array, rng: np.random.Generator, found_by: str) -> GuidePath:
-        arm, tries = self._system.check.arm, self._parameters.shortcuts
+        arm, tries = self._legs.check.arm, self._parameters.shortcuts
         path = shortened(arm, self._freedom, way, tries, rng)
         return GuidePath(path, is_clear=True, found_by=found_by)
 

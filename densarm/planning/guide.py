@@ -42,7 +42,7 @@ class PlanningParameters:
     """Longest edge that the first search adds to its trees; the second adds edges up to twice as
     long, and so on, as neither suits all spaces [rad or m]."""
 
-    shortcuts: int = 300
+    shortcuts: int = 600
     """Shortcuts tried on a way that was found."""
 
     limit_margin: float = 0.02

@@ -1,12 +1,11 @@
 """The integral curve of the density from a start along its sub-goals: the planning system."""
 
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 
 from densarm.density.navigation_density import Gauge
-from densarm.density.sub_goals import SIGHT, GuidedDensity
+from densarm.density.sub_goals import SIGHT, GuidedDensity, SubGoals
 from densarm.values.arrays import Array
 from densarm.world.separating_planes import SeparatingPlanes
 
@@ -15,6 +14,7 @@ _SMALLEST_STEP = 1e-6  # [rad], below which a step makes no progress
 _ARRIVED = 1e-7  # [rad or m] from the goal in any joint
 _GROWTH_SHARE = 0.1  # of Δᵀ∇ ln ρ, that ln ρ must grow by in a step Δ
 _MOST_STEPS = 1000
+_LEAVING = (0.1, 0.01, 1e-3)  # [rad] from a critical point, the longest that climbs
 _SEARCHES = 40  # halvings of the interval of ln τ
 _ACCURACY = 1.1  # factor within which τ is found
 
@@ -27,17 +27,14 @@ class IntegralCurve:
     """Points of the curve (N, nq), N >= 1, from the start."""
     reached: bool
     """Whether the last point is the goal; else it is where the curve got stuck."""
-    guided: GuidedDensity
-    """The density that led, as it was at the last point."""
-
-    @cached_property
-    def detail(self) -> str:
-        """Where it got stuck and what blocks it, looked for when first asked; empty if reached."""
-        return "" if self.reached else self.guided.describe_stall(self.q[-1])
+    sub_goals: SubGoals
+    """The sub-goals that it was led along, up to the current one."""
+    remark: str = ""
+    """Which critical points it left, and how; empty where it met none."""
 
 
-def integral_curve(guided: GuidedDensity, margin: float, start: Array) -> IntegralCurve:
-    r"""Integrate the direction of q̇ = ∇ρ(q) from a start (nq,), as a curve without time.
+class PlanningSystem:
+    r"""Integrates the direction of q̇ = ∇ρ(q) from a start, as a curve without time.
 
     Beside an obstacle the flow is stiff: it falls into a valley between what repels and what
     attracts, and explicit steps cross that to and fro. These are linearly implicit,
@@ -46,62 +43,78 @@ def integral_curve(guided: GuidedDensity, margin: float, start: Array) -> Integr
         A = \sum_k -\frac{\partial^2 \ln\Psi_k}{\partial h_k^2} \nabla h_k \nabla h_k^T,
 
     the time τ such that ‖Δ‖ is the length wanted, which is halved until ln ρ has grown by a share
-    of Δᵀ∇ ln ρ and the segment is proved clear beyond the margin [m]. A step that is long enough
-    for the goal goes there, where ρ is infinite. Where nothing is sensed on the segment to a
-    sub-goal, that segment is the step. A curve that can no longer climb has met a critical point.
+    of Δᵀ∇ ln ρ and the segment is proved clear beyond the margin. A step that is long enough for
+    the goal goes there, where ρ is infinite. Where nothing is sensed on the segment to a sub-goal,
+    that segment is the step. A curve that can no longer climb has met a critical point, and leaves
+    it along the unstable direction, where it has one.
+
+    Args:
+        guided: the density; its sub-goals may be changed between two curves.
+        margin: safety margin m [m].
 
     Source: [ZNV] eq. 11, section V-C; E. Hairer, G. Wanner, Solving Ordinary Differential
         Equations II, IV.7; J. Nocedal, S. Wright, Numerical Optimization, eq. 3.4.
     """
-    guided.restart()
-    climb = _Climb(guided, margin)
-    goals, density = guided.sub_goals, guided.density
-    points, q, length = [start], start, _LONGEST_STEP
-    for _ in range(_MOST_STEPS):
-        guided.update(q)
-        error = density.error(q)
-        if goals.is_last and np.abs(error).max() <= _ARRIVED:
-            return IntegralCurve(np.array([*points[:-1], goals.q[-1]]), reached=True, guided=guided)
-        if guided.is_critical():
-            break
-        q_next = climb.in_sight(q, error)
-        if q_next is None:
-            q_next = climb.step(q, error, min(_LONGEST_STEP, 2.0 * length))
-            if q_next is None:
-                break
-            length = float(np.linalg.norm(guided.world.arm.difference(q, q_next)))
-        q = q_next
-        points.append(q)
-    return IntegralCurve(np.array(points), reached=False, guided=guided)
-
-
-class _Climb:
-    """Steps up a density, each proved clear."""
 
     def __init__(self, guided: GuidedDensity, margin: float) -> None:
-        self._guided = guided
+        self.guided = guided
         self._arm = guided.world.arm
         sensed = float(guided.sub_goals.sensing_distance.max(initial=0.0))
         self._clear = SeparatingPlanes(guided.world, margin)
-        self._unsensed = SeparatingPlanes(guided.world, margin + sensed)
+        self._unsensed = SeparatingPlanes(guided.world, margin, sensed)
         self._gradient = np.empty(self._arm.nv)
         self._curvature = np.empty((self._arm.nv, self._arm.nv))
 
-    def in_sight(self, q: Array, error: Array) -> Array | None:
+    def curve(self, start: Array) -> IntegralCurve:
+        """Return the curve from a start (nq,) along the sub-goals, up to where it gets stuck."""
+        guided = self.guided
+        guided.restart()
+        goals, density = guided.sub_goals, guided.density
+        points, q, length, left = [start], start, _LONGEST_STEP, list[str]()
+        for _ in range(_MOST_STEPS):
+            guided.update(q)
+            error = density.error(q)
+            if goals.is_last and np.abs(error).max() <= _ARRIVED:
+                ends = np.array([*points[:-1], goals.q[-1]])
+                return IntegralCurve(ends, reached=True, sub_goals=goals, remark="; ".join(left))
+            is_critical = guided.is_critical()
+            q_next = None if is_critical else self._in_sight(q, error)
+            if q_next is None and not is_critical:
+                q_next = self._step(q, error, min(_LONGEST_STEP, 2.0 * length))
+                if q_next is not None:
+                    length = float(np.linalg.norm(self._arm.difference(q, q_next)))
+            if q_next is None:
+                q_next, how = self._leave(q)
+                if q_next is None:
+                    break
+                left.append(how)
+            q = q_next
+            points.append(q)
+        remark = "; ".join(left)
+        return IntegralCurve(np.array(points), reached=False, sub_goals=goals, remark=remark)
+
+    def describe_stall(self, curve: IntegralCurve) -> str:
+        """Return, as a phrase, where a curve got stuck and what blocks it; empty if it reached."""
+        if curve.reached:
+            return ""
+        self.guided.lead_along(curve.sub_goals)
+        return self.guided.describe_stall(curve.q[-1])
+
+    def _in_sight(self, q: Array, error: Array) -> Array | None:
         """Return the sub-goal if Ψ = 1 on the segment to it from q (nq,), which was updated.
 
         There ρ depends on V alone, and grows along the segment.
         """
-        goals = self._guided.sub_goals
-        if self._guided.density.log_psi < 0.0 or np.abs(error).max() > SIGHT:
+        goals = self.guided.sub_goals
+        if self.guided.density.log_psi < 0.0 or np.abs(error).max() > SIGHT:
             return None
         goal = np.asarray(goals.q[goals.current])
-        is_unsensed = self._guided.sub_goal_in_sight(q) is not None
+        is_unsensed = self.guided.sub_goal_in_sight(q) is not None
         return goal if is_unsensed or self._unsensed.segment_is_clear(q, goal) else None
 
-    def step(self, q: Array, error: Array, length: float) -> Array | None:
+    def _step(self, q: Array, error: Array, length: float) -> Array | None:
         """Return the next point, at most so far [rad], or None where ρ grows no more."""
-        density, gradient = self._guided.density, self._gradient
+        density, gradient = self.guided.density, self._gradient
         left = float(np.linalg.norm(error))
         if left <= length and self._clear.segment_is_clear(q, density.goal):
             return density.goal.copy()
@@ -121,6 +134,20 @@ class _Climb:
                 return candidate
             length *= 0.5
         return None
+
+    def _leave(self, q: Array) -> tuple[Array | None, str]:
+        """Return a point away from the critical point q (nq,), if there is one, and how."""
+        guided, density = self.guided, self.guided.density
+        density.update(q)
+        before, direction = density.log_value(), guided.unstable_direction(q)
+        if direction is None:
+            return None, ""
+        for length in _LEAVING:
+            candidate = self._arm.integrate(q, length * direction)
+            density.update(candidate)
+            if density.log_value() > before and self._clear.segment_is_clear(q, candidate):
+                return candidate, guided.describe_departure(q, direction)
+        return None, ""
 
 
 def _rate(pull: Array, stiffness: Array, length: float) -> float:

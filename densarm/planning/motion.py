@@ -81,6 +81,8 @@ class Motion:
     """Wall-clock time that the search for them took [s]; zero without a search."""
     detail: str = ""
     """Why it ends short of the goal; empty where it does not."""
+    remark: str = ""
+    """Which critical points of ρ its curve left, and how; empty where it met none."""
 
     @property
     def duration(self) -> float:

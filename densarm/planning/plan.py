@@ -14,7 +14,7 @@ from densarm.density.navigation_density import DensityParameters
 from densarm.density.sub_goals import GuidePath
 from densarm.density.unsafe_sets import SensingParameters
 from densarm.errors import InvalidValueError
-from densarm.planning.density_guide import DensityGuide, PlanningSystem
+from densarm.planning.density_guide import DensityGuide, Legs
 from densarm.planning.guide import Guide, NoPath, PlanningParameters
 from densarm.planning.motion import Motion, PlanningError, TimingParameters
 from densarm.planning.path_guide import PathGuide
@@ -53,7 +53,7 @@ _ATTEMPTS = ((1.0, 0.02), (0.25, 1.0), (0.05, 1.0))
 _AT_GOAL = 1e-7  # [rad or m]; a shorter way is left to feedback, for rounding shapes its curve
 
 _END_SHARE = 0.5  # of the clearance at start and goal that a path's margin may take
-_SMOOTH_SHARE = 0.8  # of what a path keeps that the smooth path near it keeps
+_SMOOTH_SHARE = 0.7  # of what a path keeps that the smooth path near it keeps
 _HALVINGS = 7  # of what a path keeps, until that is proved
 _STOP_SHARE = 0.5  # of the smooth path's that stopping keeps too; the rest is for tracking errors
 
@@ -106,7 +106,7 @@ def plan_motion(
         alpha: α of the planning system.
         kappa: κ of its goal distance.
         period: time between the motion's knots, for which torques will be held [s].
-        density: θ and gauge of the planning system.
+        density: θ, gauge and weights of V of the planning system.
         sensing: sensing distances.
         search: how long and how finely a path is searched.
         timing: shares of the limits that the motion may use.
@@ -117,15 +117,15 @@ def plan_motion(
         InvalidValueError: no configuration, an unknown guide, or a value out of its range.
     """
     check = SweptCheck(world, margin)
-    distance = TorusDistance(world.arm, kappa=kappa)
-    system = PlanningSystem(check, distance, replace(density, alpha=alpha), sensing)
-    planned = _planned(system, start, goal, guide, seed, path_margin, search)
-    points, kept, stuck = planned.path.waypoints, planned.kept, ""
+    distance = TorusDistance(world.arm, density.weights, kappa)
+    legs = Legs(check, distance, replace(density, alpha=alpha), sensing)
+    planned = _planned(legs, start, goal, guide, seed, path_margin, search)
+    points, kept, stuck, remark = planned.path.waypoints, planned.kept, "", ""
     if not planned.path.is_clear:
-        curve = system.curve_from_either_end(planned.path)
+        curve = legs.curve_from_either_end(planned.path)
         space, rng = SeparatingPlanes(world, margin, kept), np.random.default_rng(seed)
         points = shortened(world.arm, space, curve.q, search.shortcuts, rng)
-        kept, stuck = _kept_along(check, points, kept), curve.detail
+        kept, stuck, remark = _kept_along(check, points, kept), legs.why_stuck(curve), curve.remark
     points, kept = np.vstack([start, points]), _SMOOTH_SHARE * kept
     motion = replace(
         _timed(world, margin, kept, points, period, timing, time_limit),
@@ -133,6 +133,7 @@ def plan_motion(
         path=planned.path,
         plan_time=planned.plan_time,
         detail=stuck,
+        remark=remark,
     )
     if stuck:
         raise PlanningError(Outcome.STUCK, stuck, motion)
@@ -158,14 +159,13 @@ def plan_path(
 
     Args and errors as for `plan_motion`.
     """
-    distance = TorusDistance(world.arm, kappa=kappa)
-    leading = replace(density, alpha=alpha)
-    system = PlanningSystem(SweptCheck(world, margin), distance, leading, sensing)
-    return _planned(system, start, goal, guide, seed, path_margin, search)
+    distance = TorusDistance(world.arm, density.weights, kappa)
+    legs = Legs(SweptCheck(world, margin), distance, replace(density, alpha=alpha), sensing)
+    return _planned(legs, start, goal, guide, seed, path_margin, search)
 
 
 def _planned(
-    system: PlanningSystem,
+    legs: Legs,
     start: ArrayLike,
     goal: ArrayLike,
     guide: str | Guide,
@@ -173,7 +173,7 @@ def _planned(
     path_margin: float,
     search: PlanningParameters,
 ) -> PlannedPath:
-    check = system.check
+    check = legs.check
     world, arm, margin = check.world, check.arm, check.margin
     start, goal = arm.check_configuration("start", start), arm.check_configuration("goal", goal)
     non_negative_integer("seed", seed)
@@ -195,7 +195,7 @@ def _planned(
         path, kept = _searched(check, depart, arrive, path_margin, least, search, seed)
     elif isinstance(guide, str):
         space = SeparatingPlanes(world, margin, kept)
-        answer = DensityGuide(system, space, search).plan(depart, arrive, seed)
+        answer = DensityGuide(legs, space, search).plan(depart, arrive, seed)
         if isinstance(answer, GuidePath):
             path, kept = answer, _kept_along(check, answer.waypoints, kept)
         elif guide == "density":

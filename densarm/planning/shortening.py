@@ -1,12 +1,15 @@
 """Shortening of a path by clear ways between points of it."""
 
+import math
 from itertools import pairwise
 
 import numpy as np
+from numpy.typing import NDArray
 
 from densarm.arms.arm import Arm
 from densarm.planning.guide import FreeSpace
 from densarm.values.arrays import Array
+from densarm.values.kernels import compiled, compiled_part
 
 _SPACING = 0.5  # [rad or m] between the points of a path that a try starts and ends at
 _LEAST_GAIN = 3e-4  # of a path's length; a try that gains less is not worth a check
@@ -32,26 +35,19 @@ def shortened(
         (2007), section 3.
     """
     points = _resampled(arm, path)
+    angles, is_continuous = arm.angles(points), arm.continuous
     least = _LEAST_GAIN * _length(arm.difference(points[:-1], points[1:])).sum()
     for _ in range(tries):
-        joint = rng.integers(arm.nv + 1)
-        begin, end = np.sort(rng.integers(len(points), size=2))
-        if end - begin < 2:
+        joint = int(rng.integers(arm.nv + 1))
+        begin, end = (int(index) for index in np.sort(rng.integers(len(points), size=2)))
+        way = np.empty((end - begin + 1, arm.nv))
+        if not _write_way(angles, is_continuous, begin, end, joint, way) > least:
             continue
-        steps = arm.difference(points[begin:end], points[begin + 1 : end + 1])
-        length, chord = _length(steps), arm.difference(points[begin], points[end])
-        way = np.vstack([np.zeros(arm.nv), np.cumsum(steps, axis=0)])
-        share = np.append(0.0, np.cumsum(length))
-        is_straight = joint == arm.nv
-        chosen = slice(None) if is_straight else slice(joint, joint + 1)
-        way[:, chosen] = (share / max(share[-1], 1e-300))[:, np.newaxis] * chord[chosen]
-        if not length.sum() - _length(np.diff(way, axis=0)).sum() > least:
-            continue
-        candidate = arm.integrate(points[begin], way)
+        candidate = arm.configurations(way)
         candidate[[0, -1]] = points[[begin, end]]
-        checked = candidate[[0, -1]] if is_straight else candidate
+        checked = candidate[[0, -1]] if joint == arm.nv else candidate
         if all(freedom.segment_is_clear(a, b) for a, b in pairwise(checked)):
-            points[begin : end + 1] = candidate
+            points[begin : end + 1], angles[begin : end + 1] = candidate, way
     kept = [points[0]]
     for waypoint, after in pairwise(points[1:]):
         if not freedom.segment_is_clear(kept[-1], after):
@@ -72,3 +68,51 @@ def _resampled(arm: Arm, path: Array) -> Array:
 
 def _length(steps: Array) -> Array:
     return np.asarray(np.linalg.norm(steps, axis=1))
+
+
+@compiled
+def _write_way(
+    angles: Array,
+    is_continuous: NDArray[np.bool_],
+    begin: int,
+    end: int,
+    joint: int,
+    out: Array,
+) -> float:
+    """Write a way between two points on which a joint goes straight, and return what it gains.
+
+    Args:
+        angles: joint positions of all points (W, nv) [rad or m].
+        is_continuous: joints that go the short way round (nv,).
+        begin: index of one point.
+        end: index of the other, not before it.
+        joint: index of the joint; nv for all of them.
+        out: the way (end - begin + 1, nv) [rad or m], overwritten.
+    """
+    n, nv = end - begin, angles.shape[1]
+    share, longer, shorter = np.zeros(n + 1), 0.0, 0.0
+    out[0] = angles[begin]
+    for k in range(n):
+        square = 0.0
+        for j in range(nv):
+            step = _turn(angles[begin + k + 1, j] - angles[begin + k, j], is_continuous[j])
+            out[k + 1, j] = out[k, j] + step
+            square += step * step
+        longer += math.sqrt(square)
+        share[k + 1] = longer
+    for j in range(nv):
+        if (j == joint or joint == nv) and longer > 0.0:
+            chord = _turn(angles[end, j] - angles[begin, j], is_continuous[j])
+            for k in range(1, n + 1):
+                out[k, j] = out[0, j] + share[k] / longer * chord
+    for k in range(n):
+        square = 0.0
+        for j in range(nv):
+            square += (out[k + 1, j] - out[k, j]) ** 2
+        shorter += math.sqrt(square)
+    return longer - shorter
+
+
+@compiled_part
+def _turn(step: float, is_continuous: bool) -> float:
+    return math.atan2(math.sin(step), math.cos(step)) if is_continuous else step

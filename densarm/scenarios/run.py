@@ -139,10 +139,10 @@ def _plan(scenario: Scenario, start: Array, guide: Guide | None) -> Drive:
     }
     law: dict[str, Any] = {"density": scenario.density, "sensing": scenario.sensing}
     search |= {**law, "alpha": control.planning_alpha, "kappa": control.kappa}
-    distance = TorusDistance(scenario.arm, kappa=control.kappa)
     if control.form in {ControlForm.REGULATION, ControlForm.PLAIN}:
         planned = plan_path(world, start, goal, chosen, **search)
         is_plain = control.form == ControlForm.PLAIN
+        weighted = TorusDistance(scenario.arm, scenario.density.weights, control.kappa)
         regulation = DensityRegulation(
             world,
             goal,
@@ -151,7 +151,7 @@ def _plan(scenario: Scenario, start: Array, guide: Guide | None) -> Drive:
             margin=control.margin,
             gains=scenario.gains,
             period=period,
-            goal_distance=None if is_plain else distance,
+            goal_distance=None if is_plain else weighted,
             speed=scenario.speed,
             **law,
         )
@@ -171,6 +171,7 @@ def _plan(scenario: Scenario, start: Array, guide: Guide | None) -> Drive:
         if error.motion is None:
             raise
         motion = error.motion  # the arm goes as far as the density leads, which the record shows
+    distance = TorusDistance(scenario.arm, kappa=control.kappa)
     tracking = DensityTracking(world, motion, gains=scenario.gains, goal_distance=distance, **law)
     return Drive(tracking, motion.plan_time, motion)
 

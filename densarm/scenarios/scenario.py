@@ -16,7 +16,7 @@ from densarm.certificates.task import Input, SimulationParameters, Task
 from densarm.control.controller import Gains
 from densarm.control.speed_law import SpeedParameters
 from densarm.control.tracking import require_smooth_goal
-from densarm.density.goal_distance import KAPPA_MIN
+from densarm.density.goal_distance import KAPPA_MIN, joint_weights
 from densarm.density.navigation_density import DensityParameters
 from densarm.density.unsafe_sets import SensingParameters
 from densarm.errors import DensarmError, FileContentError, InvalidValueError, UnknownNameError
@@ -91,7 +91,7 @@ class Scenario:
 
     Raises:
         InvalidValueError: start or goal is not a configuration, the seed is not a whole number,
-            or the density gives no feedback that settles at a goal.
+            weights are not one per joint, or the density gives no feedback that settles at a goal.
         RobotDescriptionError: torque is to drive an arm with links without a mass.
     """
 
@@ -131,6 +131,7 @@ class Scenario:
             q = self.arm.check_configuration(f"{key} configuration", getattr(self, key))
             object.__setattr__(self, key, q)
         non_negative_integer("seed", self.seed)
+        joint_weights("density.weights", self.arm, self.density.weights)
         form = self.control.form
         if form != ControlForm.VELOCITY:
             self.arm.require_masses(f"control.form = {str(form)!r}")

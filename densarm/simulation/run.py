@@ -57,6 +57,8 @@ class Run:
     """Largest joint error against the controller's reference [rad or m]; None without one."""
     replanned_at: tuple[float, ...] = ()
     """Times at which the arm had lost its plan, and there was a new one from where it was [s]."""
+    remark: str = ""
+    """Which critical points of ρ it left, and how, in a phrase; empty where it met none."""
 
     @classmethod
     def at_rest(cls, task: Task, world: World, outcome: Outcome, detail: str) -> "Run":
@@ -137,6 +139,7 @@ class Run:
             "preparation_time_s": self.preparation_time,
             "tracking_error_rad": self.tracking_error,
             "replanned_at_s": list(self.replanned_at),
+            "remark": self.remark,
         }
         with atomic_file(Path(path)) as file:
             np.savez_compressed(
@@ -170,6 +173,7 @@ class Run:
                 preparation_time=float(result["preparation_time_s"]),
                 tracking_error=None if deviation is None else float(deviation),
                 replanned_at=tuple(float(time) for time in result.get("replanned_at_s", ())),
+                remark=str(result.get("remark", "")),
             )._checked()
         except OSError as error:
             raise FileContentError(path, error.strerror or "cannot be read") from None

@@ -169,6 +169,7 @@ class _Loop:
             detail=detail,
             tracking_error=tracking_error,
             replanned_at=tuple(getattr(self.controller, "replanned_at", ())),
+            remark=str(getattr(self.controller, "remark", "")),
         )
 
     def _input(self, t: float, q: Array, v: Array) -> Array:

@@ -176,7 +176,8 @@ def _follow(scenario: Scenario, field: type[BarrierField], *parameters: float) -
     ends = {"start": scenario.start, "goal": scenario.goal}
     if fault := infeasibility(SweptCheck(world, margin), ends):
         raise PlanningError(Outcome.INFEASIBLE, fault)
-    distance, gains = TorusDistance(scenario.arm, kappa=scenario.control.kappa), scenario.gains
+    weights, gains = scenario.density.weights, scenario.gains
+    distance = TorusDistance(scenario.arm, weights, scenario.control.kappa)
     followed = field(Barriers(world, margin), scenario.goal, distance, gains.rate, *parameters)
     law = SpeedLaw(world, margin, scenario.speed)
     period = scenario.simulation.control_period
