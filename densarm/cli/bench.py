@@ -88,8 +88,8 @@ def step(arm: str, shapes: str, pairs: int, steps: int, json: Path | None) -> No
 _set_options = together(
     choice_option(
         "--guide",
-        ["path", "direct", "both"],
-        "What supplies the sub-goals; both: path, and what direct reaches beside it.",
+        ["auto", "density", "direct", "path", "both"],
+        "What supplies the sub-goals; both: auto, and what direct reaches beside it.",
     ),
     click.option(
         "--time-optimal",
@@ -190,7 +190,7 @@ def _run_set(
             raise FileContentError(folder, error.strerror or "cannot be made") from None
         return run_problems(problems, jobs, report, guide=guide, save_dir=folder, **options)
 
-    results = run("path" if guide == "both" else guide, save_dir)
+    results = run("auto" if guide == "both" else guide, save_dir)
     direct = run("direct", save_dir and save_dir / "direct") if guide == "both" else None
     if json:
         beside = {"direct": direct.to_json()} if direct else {}
@@ -212,6 +212,8 @@ def print_problem_sets(results: ProblemResults, direct: ProblemResults | None = 
         ],
         "Medians over the runs that reached the goal; planning 50, 95 and 98 %.",
     )
+    led_by = ", ".join(f"{count} by {what}" for what, count in results.led_by.items() if what)
+    click.echo(f"Led: {led_by or 'none'}.")
     for result in results.results:
         if result.outcome != Outcome.REACHED or not result.certified:
             word = "not certified" if result.outcome == Outcome.REACHED else result.outcome

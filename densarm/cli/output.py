@@ -116,6 +116,8 @@ def print_run(run: Run, compiled: float) -> None:
         ),
         "planning": f"{run.plan_time:.3f} s, ready after {run.preparation_time:.2f} s",
     }
+    if run.led_by:
+        figures["led by"] = run.led_by + (f"; alone it is stuck: {run.stuck}" if run.stuck else "")
     if compiled > 0.0:
         figures["compiled"] = f"{compiled:.1f} s, once on this machine"
     if run.tracking_error is not None:

@@ -15,7 +15,7 @@ from densarm.planning.shortening import shortened
 from densarm.values.arrays import Array
 from densarm.world.swept_check import SweptCheck
 
-_DRAWN = 8  # configurations for each via point, of which it is the one with the most room
+_DRAWN = 100  # configurations at most until one is clear
 
 
 class Legs:
@@ -71,9 +71,9 @@ class Legs:
 class DensityGuide:
     """Lead by the density alone, and where that is stuck by way of a via point.
 
-    Via points are drawn near both ends and from everywhere in turn, each the one with the most
-    room of a few. From both ends the density leads to it: leaving narrow space is easier than
-    entering it. The two curves joined, and shortened, are the way.
+    Via points are drawn near both ends and from everywhere in turn. From both ends the density
+    leads to one: leaving narrow space is easier than entering it. The two curves joined, and
+    shortened, are the way.
 
     Args:
         legs: the density that leads.
@@ -102,7 +102,7 @@ class DensityGuide:
                 from_start = self._legs.curve(_pair(start, via))
                 if from_start.reached:
                     way = np.vstack([from_start.q, from_goal.q[-2::-1]])
-                    found_by = f"the density by way of via point {index + 1}"
+                    found_by = "the density by way of a via point"
                     return replace(self._path(way, rng, found_by), stuck=stuck)
         tried = f"; from none of {self._parameters.vias} via points it leads to both ends"
         return NoPath(stuck + (tried if self._parameters.vias else ""))
@@ -114,12 +114,15 @@ class DensityGuide:
         if room[0] <= room[1]:
             return self._legs.curve_from_either_end(_pair(start, goal))
         curve = self._legs.curve_from_either_end(_pair(goal, start))
-        return replace(curve, q=curve.q[::-1])
+        return replace(curve, q=curve.q[::-1]) if curve.reached else curve
 
     def _via(self, bounds: Bounds, rng: np.random.Generator) -> Array:
         check = self._legs.check
-        drawn = [check.arm.configurations(bounds.draw(rng)) for _ in range(_DRAWN)]
-        return max(drawn, key=lambda q: check.distance_margin(q).min(initial=np.inf))
+        for _ in range(_DRAWN):
+            via = check.arm.configurations(bounds.draw(rng))
+            if check.configuration_is_clear(via):
+                break
+        return via
 
     def _path(self, way: Array, rng: np.random.Generator, found_by: str) -> GuidePath:
         arm, tries = self._legs.check.arm, self._parameters.shortcuts

@@ -188,7 +188,9 @@ def _planned(
     kept = np.minimum(path_margin, least)
     if guide == "direct":
         # Not claimed to be clear: the density bends around what blocks it, or gets stuck there.
-        return PlannedPath(GuidePath(np.stack([depart, arrive]), is_clear=False), kept, 0.0)
+        ends = np.stack([depart, arrive])
+        path = GuidePath(ends, is_clear=False, found_by="the density alone")
+        return PlannedPath(path, kept, 0.0)
     began = time.perf_counter()
     answer: GuidePath | NoPath
     if guide == "path":

@@ -11,7 +11,7 @@ from densarm.planning.guide import FreeSpace
 from densarm.values.arrays import Array
 from densarm.values.kernels import compiled, compiled_part
 
-_SPACING = 0.5  # [rad or m] between the points of a path that a try starts and ends at
+_SPACINGS = 0.5, 0.3  # [rad or m] at most between points that tries start and end at, in turn
 _LEAST_GAIN = 3e-4  # of a path's length; a try that gains less is not worth a check
 
 
@@ -28,13 +28,21 @@ def shortened(
         arm: the joint space.
         freedom: proves segments.
         path: waypoints (W, nq), W >= 2.
-        tries: number of pairs of points.
+        tries: number of pairs of points, at least 2.
         rng: draws them.
 
     Source: R. Geraerts, M. H. Overmars, Creating High-quality Paths for Motion Planning, IJRR 26
         (2007), section 3.
     """
-    points = _resampled(arm, path)
+    for spacing in _SPACINGS:
+        path = _straightened(arm, freedom, _resampled(arm, path, spacing), tries // 2, rng)
+    return path
+
+
+def _straightened(
+    arm: Arm, freedom: FreeSpace, points: Array, tries: int, rng: np.random.Generator
+) -> Array:
+    """Return what is left of the points of a path (W, nq) once ways between them are shorter."""
     angles, is_continuous = arm.angles(points), arm.continuous
     least = _LEAST_GAIN * _length(arm.difference(points[:-1], points[1:])).sum()
     for _ in range(tries):
@@ -55,10 +63,10 @@ def shortened(
     return np.stack([*kept, points[-1]])
 
 
-def _resampled(arm: Arm, path: Array) -> Array:
-    """Return a path's waypoints (W, nq) with points between them where they are far apart."""
+def _resampled(arm: Arm, path: Array, spacing: float) -> Array:
+    """Return a path's waypoints (W, nq) with points between them where they are farther apart."""
     steps = arm.difference(path[:-1], path[1:])
-    parts = np.maximum(1, np.ceil(_length(steps) / _SPACING).astype(int))
+    parts = np.maximum(1, np.ceil(_length(steps) / spacing).astype(int))
     pieces = [
         arm.integrate(q, np.arange(n)[:, np.newaxis] / n * step)
         for q, step, n in zip(path, steps, parts, strict=False)

@@ -19,7 +19,7 @@ from densarm.control.replanning import Replanning
 from densarm.control.tracking import DensityTracking
 from densarm.density.goal_distance import InertiaDistance, TorusDistance
 from densarm.density.navigation_density import density_towards
-from densarm.planning.guide import Guide
+from densarm.planning.guide import Guide, GuidePath
 from densarm.planning.motion import Motion, PlanningError
 from densarm.planning.plan import GUIDES, inside_limits, plan_motion, plan_path
 from densarm.scenarios.scenario import ControlForm, Scenario, load_scenario
@@ -40,6 +40,8 @@ class Drive:
     """Wall-clock time that its guide took [s], if it has one."""
     motion: Motion | None = None
     """What the controller tracks, if it does."""
+    path: GuidePath | None = None
+    """The sub-goals that a guide found, if it has one."""
 
 
 Baseline = Callable[[Scenario], Drive]
@@ -93,7 +95,9 @@ def run_by(scenario: Scenario, baseline: Baseline, on_progress: OnProgress = lam
     done = simulate_task(task, world, drive.controller, on_progress=on_progress)
     if done.outcome == Outcome.INFEASIBLE:
         return done
-    return replace(done, plan_time=drive.plan_time, preparation_time=elapsed)
+    led_by, stuck = (drive.path.found_by, drive.path.stuck) if drive.path else ("", "")
+    done = replace(done, plan_time=drive.plan_time, preparation_time=elapsed)
+    return replace(done, led_by=led_by, stuck=stuck)
 
 
 def by_density(scenario: Scenario, guide: Guide | None = None, *, replans: bool = True) -> Drive:
@@ -155,7 +159,7 @@ def _plan(scenario: Scenario, start: Array, guide: Guide | None) -> Drive:
             speed=scenario.speed,
             **law,
         )
-        return Drive(regulation, planned.plan_time)
+        return Drive(regulation, planned.plan_time, path=planned.path)
     try:
         motion = plan_motion(
             world,
@@ -173,7 +177,7 @@ def _plan(scenario: Scenario, start: Array, guide: Guide | None) -> Drive:
         motion = error.motion  # the arm goes as far as the density leads, which the record shows
     distance = TorusDistance(scenario.arm, kappa=control.kappa)
     tracking = DensityTracking(world, motion, gains=scenario.gains, goal_distance=distance, **law)
-    return Drive(tracking, motion.plan_time, motion)
+    return Drive(tracking, motion.plan_time, motion, motion.path)
 
 
 def records(run: Run) -> tuple[EnergyRecord, RantzerRecord]:

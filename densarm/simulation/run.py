@@ -50,6 +50,10 @@ class Run:
     """What stood in the way, in a phrase; empty when reached."""
     plan_time: float = 0.0
     """Wall-clock time that the guide took [s]; zero for the direct guide."""
+    led_by: str = ""
+    """What found the way, in a phrase; empty for a guide or controller of one's own."""
+    stuck: str = ""
+    """Where the density alone gets stuck, and what blocks it, in a phrase; empty where it leads."""
     preparation_time: float = 0.0
     """Wall-clock time from the scenario to the first torque [s], planning included, and compiling
     where kernels are not on disk yet; zero where nothing moved."""
@@ -118,6 +122,7 @@ class Run:
             "min_clearance_m": smallest if np.isfinite(smallest) else None,
             "goal_error_rad": error if np.isfinite(error) else None,
             "peak_torque_ratio": self.peak_torque_ratio if by_torque else None,
+            "led_by": self.led_by,
             "plan_time_s": self.plan_time,
             "preparation_time_s": self.preparation_time,
             "certified": self.certified,
@@ -136,6 +141,8 @@ class Run:
             "outcome": str(self.outcome),
             "detail": self.detail,
             "plan_time_s": self.plan_time,
+            "led_by": self.led_by,
+            "stuck": self.stuck,
             "preparation_time_s": self.preparation_time,
             "tracking_error_rad": self.tracking_error,
             "replanned_at_s": list(self.replanned_at),
@@ -170,6 +177,8 @@ class Run:
                 outcome=Outcome(result["outcome"]),
                 detail=str(result["detail"]),
                 plan_time=float(result["plan_time_s"]),
+                led_by=str(result.get("led_by", "")),
+                stuck=str(result.get("stuck", "")),
                 preparation_time=float(result["preparation_time_s"]),
                 tracking_error=None if deviation is None else float(deviation),
                 replanned_at=tuple(float(time) for time in result.get("replanned_at_s", ())),

@@ -1,6 +1,7 @@
 """Problems: from a start to a goal in a scene, one by one or in processes, and their results."""
 
 import signal
+from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, replace
@@ -74,6 +75,8 @@ class ProblemResult:
     """Length of the way in joint space [rad or m]."""
     certified: bool = False
     """Whether the certificate holds in every part."""
+    led_by: str = ""
+    """What found the way, as a phrase."""
 
     @property
     def optimal_ratio(self) -> float | None:
@@ -118,6 +121,11 @@ class ProblemResults:
         """Return the number of runs that ended so."""
         return sum(r.outcome == outcome for r in self.results)
 
+    @property
+    def led_by(self) -> dict[str, int]:
+        """Number of runs that reached the goal, by what found their way."""
+        return dict(Counter(r.led_by for r in self.results if r.outcome == Outcome.REACHED))
+
     def percentiles(self, measure: str) -> list[float] | None:
         """Return the `PERCENTILES` of one of `MEASURES` over the runs that reached, where known."""
         reached = [getattr(r, measure) for r in self.results if r.outcome == Outcome.REACHED]
@@ -138,6 +146,7 @@ class ProblemResults:
             "reached": self.count(Outcome.REACHED),
             "certified": self.certified,
             "total": self.total,
+            "led_by": self.led_by,
             "outcomes": {outcome: self.count(outcome) for outcome in RUN_ENDS},
             **{measure: self.percentiles(measure) for measure in MEASURES},
             "min_clearance_m": self.min_clearance,
@@ -179,7 +188,7 @@ def run_problems(
 def run_problem(
     problem: MotionProblem,
     seed: int = 0,
-    guide: str = "path",
+    guide: str = "auto",
     save_dir: Path | None = None,
     time_optimal: bool = False,
 ) -> ProblemResult:
@@ -188,7 +197,7 @@ def run_problem(
     Args:
         problem: of a known robot.
         seed: of the planner.
-        guide: what supplies the sub-goals: "path" or "direct".
+        guide: what supplies the sub-goals: one of `GUIDES`.
         save_dir: folder of the recorded runs, SCENE_INDEX.npz; a problem whose record is there
             already is not run again. None to keep none.
         time_optimal: whether to compute the shortest time along the run's path.

@@ -21,7 +21,7 @@ from densarm.density.unsafe_sets import ClearanceSet, JointLimitSet, SensingPara
 from densarm.euclidean.density import EuclideanDensity
 from densarm.euclidean.implicit import UnsafeRegion
 from densarm.euclidean.shapes import Ball, CShape, Ellipsoid
-from densarm.planning.integral_curve import integral_curve
+from densarm.planning.integral_curve import PlanningSystem
 from densarm.scene.obstacles import Box, Obstacle, Sphere
 from densarm.scene.scene import Scene
 from densarm.values.arrays import Array
@@ -144,10 +144,12 @@ def test_behind_a_wall_is_a_maximum(ball_on_slides: Arm, across: float) -> None:
     path = GuidePath(np.array([start, goal]), is_clear=False)
     distance = TorusDistance(ball_on_slides, kappa=np.inf)
     guided = GuidedDensity(check, SubGoals(check, path, SensingParameters()), distance)
-    curve = integral_curve(guided, 0.0, start)
+    system = PlanningSystem(guided, 0.0)
+    curve = system.curve(start)
     assert not curve.reached
-    assert curve.detail.startswith("maximum of the density at joint positions (-0.1")
-    assert curve.detail.endswith("blocked by ball_0 and wall")
+    detail = system.describe_stall(curve)
+    assert detail.startswith("maximum of the density at joint positions (-0.1")
+    assert detail.endswith("blocked by ball_0 and wall")
     density, stall = stall_of(ball_on_slides, WALL, goal, curve.q[-1])
     assert stall.kind is CriticalKind.MAXIMUM
     assert (around(density, curve.q[-1]) < 0.0).all()

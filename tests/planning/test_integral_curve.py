@@ -9,7 +9,7 @@ import pytest
 from densarm.density.goal_distance import TorusDistance
 from densarm.density.sub_goals import GuidedDensity, GuidePath, SubGoals
 from densarm.density.unsafe_sets import SensingParameters
-from densarm.planning.integral_curve import IntegralCurve, integral_curve
+from densarm.planning.integral_curve import IntegralCurve, PlanningSystem
 from densarm.scene.obstacles import Sphere
 from densarm.scene.scene import Scene
 from densarm.values.arrays import Array
@@ -19,7 +19,11 @@ Maker = Callable[..., GuidedDensity]
 
 
 def curve_of(guided: GuidedDensity) -> IntegralCurve:
-    return integral_curve(guided, 0.0, guided.sub_goals.q[0])
+    return PlanningSystem(guided, 0.0).curve(guided.sub_goals.q[0])
+
+
+def why_stuck(guided: GuidedDensity, curve: IntegralCurve) -> str:
+    return PlanningSystem(guided, 0.0).describe_stall(curve)
 
 
 def is_clear(guided: GuidedDensity, q: Array) -> bool:
@@ -31,7 +35,7 @@ def test_reaches_through_the_sub_goals_without_touching(make_guided: Maker) -> N
     guided = make_guided()
     curve = curve_of(guided)
     assert curve.reached
-    assert curve.detail == ""
+    assert why_stuck(guided, curve) == ""
     np.testing.assert_array_equal(curve.q[0], guided.sub_goals.q[0])
     np.testing.assert_array_equal(curve.q[-1], guided.sub_goals.q[-1])
     assert is_clear(guided, curve.q)
@@ -47,11 +51,12 @@ def test_density_grows_along_a_direct_curve(make_guided: Maker) -> None:
 
 
 def test_start_of_swing_up_is_a_critical_point(make_guided: Maker) -> None:
-    curve = curve_of(make_guided("direct"))
+    guided = make_guided("direct")
+    curve = curve_of(guided)
     assert not curve.reached
     assert len(curve.q) == 1
-    assert "saddle of the density at joint positions (0, 0)" in curve.detail
-    assert "nothing sensed there" in curve.detail
+    assert "saddle of the density at joint positions (0, 0)" in why_stuck(guided, curve)
+    assert "nothing sensed there" in why_stuck(guided, curve)
 
 
 @pytest.mark.slow
@@ -59,7 +64,7 @@ def test_spurious_maximum_names_what_blocks(make_guided: Maker) -> None:
     guided = make_guided("direct", start=(0.01, 0.01))
     curve = curve_of(guided)
     assert not curve.reached
-    assert "lower_link_0 and right" in curve.detail
+    assert "lower_link_0 and right" in why_stuck(guided, curve)
     assert (guided.world.distances(curve.q[-1]) > 0.0).all()
 
 
@@ -104,5 +109,5 @@ def test_at_a_sub_goal_without_sight_of_the_next_it_goes_on(
     (at,) = np.flatnonzero((curve.q == corners[1]).all(axis=1))
     assert 0 < at < len(curve.q) - 1
     assert curve.reached == is_reached
-    assert ("lower_link_0 and right" in curve.detail) != is_reached
+    assert ("lower_link_0 and right" in why_stuck(guided, curve)) != is_reached
     assert is_clear(guided, curve.q)

@@ -1,4 +1,4 @@
-"""PathGuide: every edge proved clear, the same bits for the same seed, and shortcuts."""
+"""PathGuide: every edge proved clear, and the same bits for the same seed."""
 
 import signal
 import subprocess
@@ -15,8 +15,8 @@ from hypothesis import strategies as st
 from densarm.arms.arm import Arm, load_arm
 from densarm.arms.joints import POSITION_TOLERANCE
 from densarm.errors import InvalidValueError
-from densarm.planning.guide import FreeSpace, GuidePath, NoPath
-from densarm.planning.path_guide import PathGuide, PlanningParameters, shortcut
+from densarm.planning.guide import FreeSpace, GuidePath, NoPath, PlanningParameters
+from densarm.planning.path_guide import PathGuide
 from densarm.scene.obstacles import Box, Sphere
 from densarm.scene.scene import Scene
 from densarm.values.arrays import Array
@@ -370,35 +370,3 @@ def test_the_path_around_an_obstacle_is_clear_and_repeats(
     assert min(world.distances(q).min() for q in samples_of(arm, path)) > 0.0
     again = PathGuide(arm, SweptCheck(World(arm, scene))).plan(*ends, seed=0)
     np.testing.assert_array_equal(path_of(again), path)
-
-
-def length(arm: Arm, waypoints: Array) -> float:
-    return float(np.linalg.norm(arm.difference(waypoints[:-1], waypoints[1:]), axis=1).sum())
-
-
-def test_nothing_in_the_way_leaves_the_straight_segment(arm: Arm, make_discs: Discs) -> None:
-    path = np.stack([arm.configuration(a) for a in [(-1, -1), (-1, 1), (0, 1.5), (1, 1)]])
-    short = shortcut(arm, make_discs(arm), path, 50, np.random.default_rng(0))
-    np.testing.assert_array_equal(short, path[[0, -1]])
-
-
-@pytest.mark.parametrize("seed", range(5))
-def test_a_detour_shrinks_onto_the_disc(
-    seed: int, arm: Arm, make_discs: Discs, samples_of: Callable[[Arm, Array], Array]
-) -> None:
-    discs = make_discs(arm, (0.0, 0.0, 0.8))
-    corners = [(-1, 0), (-1, 1.5), (1, 1.5), (1, 0)]
-    path = np.stack([arm.configuration(corner) for corner in corners])
-    short = shortcut(arm, discs, path, 200, np.random.default_rng(seed))
-    np.testing.assert_array_equal(short[[0, -1]], path[[0, -1]])
-    assert discs.gap(samples_of(arm, short)).min() > -1e-9
-    # Two tangents of length 0.6 and the arc between them.
-    geodesic = 2 * 0.6 + 0.8 * (np.pi - 2 * np.arccos(0.8))
-    assert geodesic < length(arm, short) < 1.05 * geodesic
-
-
-def test_no_worthwhile_gain_asks_for_no_proof(arm: Arm, make_discs: Discs) -> None:
-    discs = make_discs(arm)
-    path = np.stack([arm.configuration(a) for a in [(-1, 0), (1, 0)]])
-    shortcut(arm, discs, path, 50, np.random.default_rng(0))
-    assert discs.segments == 0
