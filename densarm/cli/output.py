@@ -115,26 +115,22 @@ def print_run(run: Run, compiled: float) -> None:
             else f"{run.peak_torque_ratio:.0%} of the limits"
         ),
         "planning": f"{run.plan_time:.3f} s, ready after {run.preparation_time:.2f} s",
+        "led by": run.led_by + (f"; alone it is stuck: {run.stuck}" if run.stuck else ""),
+        "density": run.remark,
+        "compiled": f"{compiled:.1f} s, once on this machine" if compiled > 0.0 else "",
+        "planned again": ", ".join(f"at t = {time:.3f} s" for time in run.replanned_at),
+        "robot": "; ".join(run.task.arm.remarks),
     }
-    if run.led_by:
-        figures["led by"] = run.led_by + (f"; alone it is stuck: {run.stuck}" if run.stuck else "")
-    if compiled > 0.0:
-        figures["compiled"] = f"{compiled:.1f} s, once on this machine"
     if run.tracking_error is not None:
         figures["tracking error"] = f"{run.tracking_error:.2g} rad"
-    if run.remark:
-        figures["density"] = run.remark
-    if run.replanned_at:
-        figures["planned again"] = ", ".join(f"at t = {time:.3f} s" for time in run.replanned_at)
-    if run.task.arm.remarks:
-        figures["robot"] = "; ".join(run.task.arm.remarks)
     if run.base_overlaps:
         figures["not checked"] = f"{'; '.join(run.base_overlaps)}: neither moves"
     if large := run.task.large_meshes:
         sides = ", ".join(f"{name} {side:.3g} m" for name, side in large.items())
         figures["large meshes"] = f"{sides}: is their unit right?"
     for label, value in figures.items():
-        click.echo(f"{label:<{_COLUMN}}{value}")
+        if value:
+            click.echo(f"{label:<{_COLUMN}}{value}")
     click.echo()
     print_certificate(run.certificate)
 

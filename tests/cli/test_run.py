@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from densarm.arms.catalogue import scenario_paths
 from densarm.simulation.run import Run
 
 Command = Callable[..., Any]
@@ -86,16 +87,29 @@ def test_nothing_else_is_left_in_the_folder(recorded: Any) -> None:
     assert set(recorded.npz.parent.iterdir()) == written
 
 
-def test_direct_guide_is_stuck_at_the_critical_point(command: Command, tmp_path: Path) -> None:
-    done = command("run", "swing_up", "--guide", "direct", "--json", tmp_path / "run.json")
+def test_swing_up_tells_that_the_density_left_a_critical_point(
+    command: Command, tmp_path: Path
+) -> None:
+    done = command("run", "swing_up", "--json", tmp_path / "run.json")
+    assert done.status == 0
+    assert done.err == ""
+    assert "left a critical point of the density at joint positions (0, 0)" in done.out
+    data = json.loads((tmp_path / "run.json").read_text(encoding="utf-8"))
+    assert data["outcome"] == "reached"
+    assert data["certified"] is True
+    assert data["plan_time_s"] == 0.0
+
+
+def test_swing_up_with_equal_weights_is_stuck(command: Command, tmp_path: Path) -> None:
+    """V presses the arm against a ball."""
+    text = scenario_paths()["swing_up"].read_text(encoding="utf-8")
+    path = tmp_path / "equal.toml"
+    path.write_text(text.replace('weights = "inertia"', "weights = [1, 1]"), encoding="utf-8")
+    done = command("run", path)
     assert done.status == 1
     assert done.err == ""
     assert "stuck: " in done.out
-    assert "saddle of the density" in done.out
-    data = json.loads((tmp_path / "run.json").read_text(encoding="utf-8"))
-    assert data["outcome"] == "stuck"
-    assert data["certified"] is False
-    assert data["plan_time_s"] == 0.0
+    assert "maximum of the density" in done.out
 
 
 def test_clearance_without_pairs_is_null(

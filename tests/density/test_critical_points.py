@@ -13,6 +13,7 @@ from densarm.density.critical_points import (
     find_critical_point,
     find_stall,
     log_hessian,
+    unstable_direction,
 )
 from densarm.density.goal_distance import TorusDistance
 from densarm.density.navigation_density import Gauge, NavigationDensity
@@ -34,6 +35,25 @@ AWAY = -GOAL / 5.0
 
 def disc() -> EuclideanDensity:
     return EuclideanDensity([UnsafeRegion(Ball(2.0), Ball(3.0))], GOAL)
+
+
+@pytest.mark.parametrize("off", [0.0, 1e-5, -1e-5])
+def test_a_saddle_is_left_across_the_way_to_the_goal(off: float) -> None:
+    """To the side where it lies off the axis, or if on it, where the first large entry grows."""
+    density = disc()
+    saddle = find_critical_point(slope_of(density), 2.8 * AWAY).position
+    across = np.array([3.0, 4.0]) / 5.0
+    direction = unstable_direction(slope_of(density), saddle + off * across)
+    assert direction is not None
+    np.testing.assert_allclose(direction, np.copysign(1.0, off) * across, atol=1e-4)
+
+
+def test_nothing_leads_away_from_a_maximum_or_where_no_critical_point_is() -> None:
+    assert unstable_direction(lambda x: -x, np.zeros(2)) is None
+    saddle = np.diag([1.0, -1.0])
+    assert unstable_direction(lambda x: x @ saddle, np.array([0.01, 0.0])) is None
+    direction = unstable_direction(lambda x: x @ saddle, np.array([0.0, 0.0]))
+    np.testing.assert_array_equal(direction, [1.0, 0.0])
 
 
 def slope_of(density: EuclideanDensity) -> Callable[[Array], Array]:

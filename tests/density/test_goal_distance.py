@@ -32,11 +32,12 @@ def arm(joint_space: Callable[[str], Arm]) -> Arm:
     return joint_space(KINDS)
 
 
-@pytest.fixture(scope="module", params=["euclidean", "torus", "sum", "product"])
+@pytest.fixture(scope="module", params=["euclidean", "torus", "inertia", "sum", "product"])
 def distance(request: pytest.FixtureRequest, arm: Arm) -> GoalDistance:
     made: dict[str, Callable[[], GoalDistance]] = {
         "euclidean": EuclideanDistance,
         "torus": lambda: TorusDistance(arm, WEIGHTS),
+        "inertia": lambda: TorusDistance(arm, "inertia"),
         "sum": lambda: TorusDistance(arm, WEIGHTS, kappa=math.inf),
         "product": lambda: ProductDistance(arm),
     }
@@ -173,11 +174,32 @@ def test_product_is_degenerate_where_one_joint_is_at_its_goal(
 
 @pytest.mark.parametrize(
     "options",
-    [{"kappa": 0.0}, {"kappa": math.nan}, {"weights": [1.0]}, {"weights": [0.0, 1.0, 1.0, 1.0]}],
+    [
+        {"kappa": 0.0},
+        {"kappa": math.nan},
+        {"weights": [1.0]},
+        {"weights": [0.0, 1.0, 1.0, 1.0]},
+        {"weights": [1.0, 1.0, math.inf, 1.0]},
+        {"weights": "mass"},
+        {"weights": 3.0},
+    ],
 )
 def test_torus_distance_refuses_what_cannot_be(arm: Arm, options: dict[str, Any]) -> None:
     with pytest.raises(InvalidValueError):
         TorusDistance(arm, **options)
+
+
+def test_weights_by_inertia_are_those_of_the_stretched_rods(two_link: Arm) -> None:
+    """8/3 and 1/3 kg m² about their own axes: two rods of 1 m and 1 kg."""
+    weights = TorusDistance(two_link, "inertia").weights
+    np.testing.assert_allclose(weights, [1.0, 0.125], rtol=1e-12)
+
+
+def test_weights_by_inertia_are_taken_in_the_middle_of_the_limits(panda: Arm) -> None:
+    middle = 0.5 * (panda.limits.lower + panda.limits.upper)
+    inertia = panda.mass_matrix(middle).diagonal()
+    weights = TorusDistance(panda, "inertia").weights
+    np.testing.assert_allclose(weights, inertia / inertia.max(), rtol=1e-12)
 
 
 # In the metric of the inertia

@@ -182,13 +182,28 @@ def test_timing_that_may_use_no_torque_is_infeasible(swing_up: Scenario) -> None
     assert "torque limits" in error.detail
 
 
-def test_no_slope_at_the_start_is_stuck_with_a_motion_at_rest(swing_up: Scenario) -> None:
+def test_no_slope_at_the_start_is_left_and_told(swing_up: Scenario) -> None:
     error = why_not(swing_up.world, swing_up.start, swing_up.goal, "direct")
     assert error.outcome == Outcome.STUCK
-    assert error.detail.startswith("saddle of the density at joint positions (0, 0)")
+    assert error.detail.startswith("maximum of the density")
     assert error.motion is not None
     assert error.motion.detail == error.detail
-    np.testing.assert_array_equal(error.motion.velocity, 0.0)
+    assert error.motion.remark.startswith("left a critical point of the density")
+
+
+@pytest.mark.parametrize("weights", ["inertia", (8.0, 1.0)])
+def test_weights_lead_where_equal_ones_are_stuck(swing_up: Scenario, weights: Any) -> None:
+    motion = plan_motion(
+        swing_up.world,
+        swing_up.start,
+        swing_up.goal,
+        "direct",
+        kappa=np.inf,
+        density=DensityParameters(weights=weights),
+    )
+    np.testing.assert_allclose(motion.position[-1], [np.pi, 0.0], atol=1e-9)
+    assert -2.0 < motion.position[:, 1].min()  # the elbow gives way and comes back
+    assert motion.remark.startswith("left a critical point of the density")
 
 
 def test_an_obstacle_that_blocks_is_named_and_the_motion_ends_before_it(

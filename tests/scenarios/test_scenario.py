@@ -12,7 +12,7 @@ from densarm.arms.arm import Arm
 from densarm.arms.catalogue import robots_folder
 from densarm.certificates.task import FORMAT, Task
 from densarm.control.controller import Gains
-from densarm.density.navigation_density import Gauge
+from densarm.density.navigation_density import DensityParameters, Gauge
 from densarm.errors import DensarmError, FileContentError, InvalidValueError, UnknownNameError
 from densarm.scenarios.scenario import ControlForm, ControlParameters, Scenario, load_scenario
 from densarm.scene.obstacles import Sphere
@@ -111,7 +111,9 @@ def test_every_setting_survives_the_round_trip(swing_up: Scenario) -> None:
             kappa=np.inf,
             planning_alpha=5.0,
         ),
-        density=replace(swing_up.density, theta=0.01, blend_radius=0.02, gauge=Gauge.LOG),
+        density=DensityParameters(
+            theta=0.01, blend_radius=0.02, gauge=Gauge.LOG, weights=(8.0, 1.0)
+        ),
         gains=Gains(position=25.0, velocity=10.0),
         **{
             key: halved(getattr(swing_up, key))
@@ -280,6 +282,13 @@ def test_cut_joints(tmp_path: Path) -> None:
         (BASE + "[timing]\ntorque_share = 1.5\n", "timing.torque_share = 1.5"),
         (BASE + "[planning]\niterations = 0\n", "planning.iterations = 0"),
         (BASE + "[density]\nalpha = -1\n", "density.alpha = -1"),
+        (BASE + "[density]\nweights = [1, 0]\n", "density.weights = 0.0: must be a finite"),
+        (BASE + "[density]\nweights = [1, -2]\n", "density.weights = -2.0"),
+        (BASE + "[density]\nweights = [1, nan]\n", "density.weights = (1.0, nan)"),
+        (BASE + "[density]\nweights = [1, 2, 3]\n", "of shape (2,), got (3,): one per joint"),
+        (BASE + "[density]\nweights = []\n", "of shape (2,), got (0,)"),
+        (BASE + "[density]\nweights = 'mass'\n", "one number > 0 per joint, or 'inertia'"),
+        (BASE + "[density]\nweights = 2\n", "density.weights = 2"),
         (BASE + "[density]\ngauge = 'logarithm'\n", "density.gauge = 'logarithm'"),
         (BASE + "[density]\nblend_radius = 0.05\n", "density.blend_radius = 0.05: must be 0 in"),
         (

@@ -112,10 +112,10 @@ def test_density_is_that_to_the_goal(run: Run, figure: Figure, task: Task) -> No
     (line,) = (line for axes in axes_of(figure, "ln ρ") for line in axes.get_lines())
     density = y_of(line)
     assert len(density) == len(run.time)
-    # Far from the obstacles nothing but the goal acts: V of a sum of 1 - cos in κ = 1.
+    # Far from the obstacles nothing but the goal acts: V is a weighted sum of 1 - cos.
     assert task.goal is not None
     error = task.arm.difference(task.goal, run.q[50])
-    v = np.prod(2.0 - np.cos(error)) - 1.0
+    v = (1.0 - np.cos(error)) @ [1.0, 0.125]
     assert density[50] == pytest.approx(-np.log(v))
 
 
