@@ -32,7 +32,20 @@ def test_swing_up(
     out = capsys.readouterr().out
     assert "reached the goal" in out
     assert "not proved" not in out
-    assert {path.name for path in tmp_path.iterdir()} == {"swing_up.npz", "swing_up.html"}
+    assert "left a critical point of the density" in out
+    written = {f"swing_up.{ending}" for ending in ("npz", "html", "png")}
+    assert {path.name for path in tmp_path.iterdir()} == written
+
+
+@pytest.mark.slow
+def test_three_link_swing_up(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    run_example(monkeypatch, "three_link_swing_up.py")
+    equal, inertia, certified = capsys.readouterr().out.splitlines()
+    assert equal.startswith("weights None: stuck, maximum of the density")
+    assert inertia.startswith("weights inertia: reached, left a critical point of the density")
+    assert certified == "certified: True"
 
 
 @pytest.mark.slow
@@ -114,9 +127,10 @@ def test_reading_a_run(
 
 
 OWN_PARTS = ["own_controller", "own_guide", "own_goal_distance", "own_unsafe_set", "own_plant"]
+SWING_UPS = ["swing_up", "three_link_swing_up"]
 
 
-@pytest.mark.parametrize("name", OWN_PARTS)
+@pytest.mark.parametrize("name", [*OWN_PARTS, *SWING_UPS])
 def test_own_parts_are_short(name: str) -> None:
     assert len((EXAMPLES / f"{name}.py").read_text(encoding="utf-8").splitlines()) < 40
 

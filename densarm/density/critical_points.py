@@ -105,7 +105,8 @@ def unstable_direction(
         return None
     direction = vectors[:, -1]
     large = direction[np.abs(direction) >= 0.5 * np.abs(direction).max()]
-    return direction * np.copysign(1.0, slope[-1] if abs(slope[-1]) > _UNTOLD else large[0])
+    side = np.copysign(1.0, slope[-1] if abs(slope[-1]) > _UNTOLD else large[0])
+    return np.asarray(side * direction)
 
 
 def log_hessian(gradient: Callable[[Array], Array], x: Array, step: float = 1e-5) -> Array:

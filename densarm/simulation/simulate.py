@@ -54,7 +54,7 @@ def simulate(
     Args:
         world: the arm among obstacles, as they are now.
         controller: called at each control period, with the time since the run began. Its
-            attributes `goal`, `motion`, `tracking_error` and `describe_stall`, where it has them,
+            attributes `goal`, `motion`, `tracking_error`, `remark` and `describe_stall`, if any,
             tell what it wants, how long it moves, and why it rests.
         start: configuration (nq,).
         goal: configuration (nq,); None for the controller's own.

@@ -35,7 +35,7 @@ _SPACE_WIDTH = 6.5  # [inch]
 
 _RESOLUTION = 120  # samples of each joint in the joint space
 _LEVELS = 18
-_LOWEST_SHARE = 0.05  # of the finite values of ln ρ that are below the lowest level
+_SHOWN = (0.05, 0.98)  # quantiles of ln ρ at the lowest and highest level: it is unbounded
 _AROUND = 0.4  # drawn around the motion [rad or m]
 
 
@@ -196,10 +196,10 @@ def _plot_joint_space(
     q = arm.configurations(np.column_stack([first.ravel(), second.ravel()]))
     if density is not None:
         value = _log_values(density, q)
-        lowest, highest = np.quantile(value[np.isfinite(value)], [_LOWEST_SHARE, 1.0])
+        lowest, highest = np.quantile(value[np.isfinite(value)], _SHOWN)
         levels = np.linspace(lowest, highest, _LEVELS)
-        height = np.maximum(value, lowest - 1.0).reshape(first.shape)
-        shades = axes.contourf(first, second, height, levels, cmap=DENSITY_MAP, extend="min")
+        height = np.clip(value, lowest - 1.0, highest + 1.0).reshape(first.shape)
+        shades = axes.contourf(first, second, height, levels, cmap=DENSITY_MAP, extend="both")
         axes.figure.colorbar(shades, ax=axes, label="ln ρ", format="%.1f", shrink=0.75)
     clearance = np.array([world.distances(each).min(initial=np.inf) for each in q])
     if np.isfinite(clearance).all():

@@ -202,7 +202,7 @@ def test_weights_lead_where_equal_ones_are_stuck(swing_up: Scenario, weights: An
         density=DensityParameters(weights=weights),
     )
     np.testing.assert_allclose(motion.position[-1], [np.pi, 0.0], atol=1e-9)
-    assert -2.0 < motion.position[:, 1].min()  # the elbow gives way and comes back
+    assert motion.position[:, 1].min() > -2.0  # the elbow gives way and comes back
     assert motion.remark.startswith("left a critical point of the density")
 
 
