@@ -21,8 +21,7 @@ import numpy as np
 import densarm
 from densarm.cli.bench import print_problem_sets
 from densarm.density.goal_distance import TorusDistance
-from densarm.density.sub_goals import GuidedDensity, SubGoals
-from densarm.planning.integral_curve import integral_curve
+from densarm.planning.density_guide import Legs
 from densarm.planning.plan import GUIDES, plan_path
 from densarm.study.problems import ProblemResult, ProblemResults, in_processes, problem_result
 from densarm.world.configurations import clear_configurations
@@ -39,15 +38,14 @@ def curves(scenario: densarm.Scenario, starts: list[np.ndarray]) -> int:
     """Print how many curves of the density reach the goal, and why the others do not."""
     control, check = scenario.control, SweptCheck(scenario.world, scenario.control.margin)
     distance = TorusDistance(scenario.arm, scenario.density.weights, control.kappa)
-    parameters, reached, left = replace(scenario.density, alpha=control.planning_alpha), 0, 0
+    density = replace(scenario.density, alpha=control.planning_alpha)
+    legs, reached, left = Legs(check, distance, density, scenario.sensing), 0, 0
     for start in starts:
         path = plan_path(scenario.world, start, scenario.goal, "direct", margin=control.margin).path
-        goals = SubGoals(check, path, scenario.sensing)
-        guided = GuidedDensity(check, goals, distance, parameters)
-        curve = integral_curve(guided, check.margin, path.waypoints[0])
+        curve = legs.curve(path)
         reached, left = reached + curve.reached, left + bool(curve.remark)
         if not curve.reached:
-            print(f"from {scenario.arm.angles(start).tolist()}: {curve.detail}")
+            print(f"from {scenario.arm.angles(start).tolist()}: {legs.why_stuck(curve)}")
     print(f"{reached} of {len(starts)} curves reach the goal; {left} left a critical point")
     return reached
 
