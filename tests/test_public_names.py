@@ -42,7 +42,7 @@ def test_help_says_what_each_field_is(cls: type[Any]) -> None:
 @pytest.mark.parametrize(
     ("room", "names"),
     [
-        ("density", {"JointSpaceCover", "ProductDistance", "TorusDistance"}),
+        ("density", {"JointSpaceCover", "ProductDistance"}),
         ("euclidean", {"EuclideanDensity", "run_points", "saturate"}),
     ],
 )
