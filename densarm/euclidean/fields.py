@@ -183,8 +183,11 @@ class JointSpaceField:
         return gradient
 
     def height(self, x: Array) -> Array:
-        """Act as `NavigationField.height`: ln ρ, as `DensitySample.log_value` has it."""
-        values = [self.density.evaluate(q).log_value for q in _configurations(self._arm, x)]
+        """Act as `NavigationField.height`: ln ρ, as `NavigationDensity.log_value` has it."""
+        values = []
+        for q in _configurations(self._arm, x):
+            self.density.update(q)
+            values.append(self.density.log_value())
         return np.reshape(values, x.shape[:-1])
 
 
