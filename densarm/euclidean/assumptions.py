@@ -234,7 +234,7 @@ def _polished(
         return {"type": "eq", "fun": lambda z: scale * float(function(pair(z)[k])), "jac": slope}
 
     constraints = [on_boundary(f, k) for k, f in enumerate(functions) if f is not None]
-    precise = {"ftol": _TOLERANCE**2, "maxiter": 1000}  # of a square
+    precise = {"ftol": _TOLERANCE**2, "maxiter": 100}  # of a square
     found = minimize(
         square, free, jac=True, method="SLSQP", constraints=constraints, options=precise
     )
