@@ -39,6 +39,24 @@ def test_help_says_what_each_field_is(cls: type[Any]) -> None:
             assert f"    {field.name}:\n        " in described
 
 
+@pytest.mark.parametrize(
+    ("room", "names"),
+    [
+        ("density", {"JointSpaceCover", "ProductDistance"}),
+        ("euclidean", {"EuclideanDensity", "run_points", "saturate"}),
+    ],
+)
+def test_rooms_list_what_the_paper_has_beside_the_public_names(room: str, names: set[str]) -> None:
+    package = importlib.import_module(f"densarm.{room}")
+    modules = {module.name for module in pkgutil.iter_modules(package.__path__)}
+    assert names <= set(package.__all__)
+    assert not modules & set(package.__all__)
+    for name in package.__all__:
+        assert getattr(package, name).__doc__
+    departures = (Path(densarm.__file__).parents[1] / "docs" / "departures.md").read_text("utf-8")
+    assert all(f"`densarm.{room}.{name}`" in departures for name in names)
+
+
 def test_unknown_name_is_an_attribute_error() -> None:
     unknown = "load_arms"
     with pytest.raises(AttributeError, match=unknown):

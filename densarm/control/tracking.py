@@ -47,10 +47,11 @@ class DensityTracking:
 
     .. math::
 
-        \tau = H + M \big( \ddot q_d + K_p \nabla\rho(e) - K_v \dot e \big), \qquad
-        e = q \ominus q_d, \quad \rho(e) = \Psi(q) / V(q \ominus q_d)^\alpha
+        \tau = H + M \big( \ddot q_d + K_p \nabla(-1/\rho) - K_v \dot e \big), \qquad
+        e = q \ominus q_d, \quad \rho = \Psi(q) / V(e)
 
-    In the reciprocal gauge the feedback is smooth at e = 0 and tends to -K_p e. Every sensing
+    [ZNV] has ∇ρ(e), singular at e = 0; this feedback tends to -K_p e there, and obstacles act at q,
+    where they are. Where limits need it the attraction is scaled down, then all. Every sensing
     distance is below what the motion keeps from the unsafe set, so that Ψ = 1 on it and obstacles
     act only on an arm that was pushed off it. The torque is taken to be held for the motion's
     period: q̈_d is its mean over that time.
@@ -59,7 +60,7 @@ class DensityTracking:
 
     .. math::
 
-        u = \bar{\dot q}_d + \frac{K_p}{K_v} \nabla\rho(e)
+        u = \bar{\dot q}_d + \frac{K_p}{K_v} \nabla(-1/\rho)
 
     with the mean of q̇_d over a period, inside the limits of velocity and acceleration.
 
@@ -80,7 +81,7 @@ class DensityTracking:
     Raises:
         InvalidValueError: a density that is singular, flat or blended at e = 0.
 
-    Source: [ZNV] eq. 17.
+    Source: [ZNV] eq. 17, with what docs/departures.md tells.
     """
 
     def __init__(

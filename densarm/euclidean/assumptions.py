@@ -81,7 +81,7 @@ def check_assumptions(
     parts and bounds on Ψ are of a grid, which misses what is finer than its step.
 
     Args:
-        density: its unsafe sets, sensing regions, goal, α and θ.
+        density: its unsafe sets, sensing regions, goal, α and θ; with weights of one.
         extent: bounds of the workspace X, shape (n, 2) [m].
         side: points of the grid along each axis.
         samples: random points that look for each boundary.
@@ -94,6 +94,8 @@ def check_assumptions(
     n = density.goal.size
     if box.shape != (n, 2):
         raise InvalidValueError("extent", extent, f"of shape ({n}, 2)")
+    if (density.weights != 1.0).any():
+        raise InvalidValueError("weights of V", density.weights, "ones, as [ZNV] has them")
     h, s = density.obstacles, [region.s for region in density.unsafe]
     unsafe = [(function, boundary_points(function, box, samples)) for function in h]
     sensed = [(function, boundary_points(function, box, samples)) for function in s]
@@ -232,7 +234,7 @@ def _polished(
         return {"type": "eq", "fun": lambda z: scale * float(function(pair(z)[k])), "jac": slope}
 
     constraints = [on_boundary(f, k) for k, f in enumerate(functions) if f is not None]
-    precise = {"ftol": _TOLERANCE**2, "maxiter": 1000}  # of a square
+    precise = {"ftol": _TOLERANCE**2, "maxiter": 100}  # of a square
     found = minimize(
         square, free, jac=True, method="SLSQP", constraints=constraints, options=precise
     )

@@ -18,7 +18,7 @@ from densarm.density.navigation_density import (
 from densarm.density.rantzer import RantzerCondition
 from densarm.euclidean.implicit import ImplicitFunction, UnsafeRegion
 from densarm.values.arrays import Array
-from densarm.values.checks import finite_vector
+from densarm.values.checks import finite_vector, positive_tuple
 from densarm.values.kernels import compiled
 
 _DEFAULTS = DensityParameters()
@@ -27,16 +27,22 @@ _DEFAULTS = DensityParameters()
 class EuclideanDensity:
     r"""The density of where a point of Rⁿ may spend its time.
 
-    .. math:: \rho(x) = \frac{\prod_k \Psi_k(x)}{\|x - x_{goal}\|^{2 \alpha}}
+    .. math:: \rho(x) = \frac{\prod_k \Psi_k(x)}{V(x)^\alpha}, \qquad
+        V(x) = \sum_i w_i (x_i - x_{goal,i})^2
 
-    At one point it agrees with `NavigationDensity` of `ImplicitSet`s and `EuclideanDistance`.
+    At one point and with weights of one it agrees with `NavigationDensity` of `ImplicitSet`s and
+    `EuclideanDistance`.
 
     Args:
         unsafe: unsafe sets, each with its sensing region.
         goal: shape (n,) [m].
         parameters: α, θ, gauge and blend.
+        weights: w_i > 0, dimensionless, shape (n,); ones, the V of [ZNV], by default.
 
-    Source: [ZNV] eq. 4, with V of section III.
+    Raises:
+        InvalidValueError: a goal that is not finite, or weights that are not n positive numbers.
+
+    Source: [ZNV] eq. 4, with V of section III, adapted as Remark 1 allows.
     """
 
     def __init__(
@@ -44,10 +50,15 @@ class EuclideanDensity:
         unsafe: Sequence[UnsafeRegion],
         goal: ArrayLike,
         parameters: DensityParameters = _DEFAULTS,
+        weights: ArrayLike | None = None,
     ) -> None:
         self.unsafe = tuple(unsafe)
         self.goal = finite_vector("goal", goal, np.size(goal))
         self.parameters = parameters
+        n = self.goal.size
+        self.weights = np.array(
+            positive_tuple("weights", np.ones(n) if weights is None else weights, n)
+        )
 
     @property
     def obstacles(self) -> tuple[ImplicitFunction, ...]:
@@ -64,7 +75,7 @@ class EuclideanDensity:
 
     def log_value(self, x: Array) -> Array:
         """Return ln ρ at points `x` (..., n): (...), −inf in contact for θ = 0."""
-        distance = np.maximum(np.sum((x - self.goal) ** 2, axis=-1), V_MIN)
+        distance = np.maximum((x - self.goal) ** 2 @ self.weights, V_MIN)
         return self.log_psi(x) - self.parameters.alpha * np.log(distance)  # type: ignore[no-any-return]
 
     height = log_value  # which `direction` climbs
@@ -76,8 +87,8 @@ class EuclideanDensity:
         error = rows - self.goal
         alpha = self.parameters.alpha
         out = np.empty_like(rows)
-        distance, exponents = np.sum(error * error, axis=-1), gauge_exponents(gauge, alpha)
-        slope = 2.0 * error
+        distance, exponents = error**2 @ self.weights, gauge_exponents(gauge, alpha)
+        slope = 2.0 * error * self.weights
         _write_gradients(log_psi_gradient, distance, slope, alpha, log_psi, *exponents, out)
         return out.reshape(x.shape)
 
@@ -108,13 +119,16 @@ class EuclideanDensity:
 
 
 def rantzer_map(density: EuclideanDensity, x: Array, step: float = 1e-5) -> RantzerCondition:
-    """Return ΔL = Δ ln Ψ − 2α(n − 2)/‖x − x_goal‖² and ‖∇L‖² at points (..., n) [m].
+    """Return ΔL = Δ ln Ψ − α Δ ln V and ‖∇L‖² at points (..., n) [m].
 
-    Δ ln Ψ is by central differences of a step [m], and exactly zero out of sensing regions.
+    Δ ln V = 2 Σ w_i/V − 4 Σ (w_i e_i)²/V², which is 2(n − 2)/‖e‖² for weights of one. Δ ln Ψ is by
+    central differences of a step [m], and exactly zero out of sensing regions.
     """
-    n = x.shape[-1]
-    laplacian = -2.0 * density.parameters.alpha * (n - 2) / np.sum((x - density.goal) ** 2, axis=-1)
-    for i, axis in enumerate(step * np.eye(n)):
+    weights, square = density.weights, (x - density.goal) ** 2
+    distance = square @ weights
+    log_distance = (2.0 * weights.sum() - 4.0 * (square @ weights**2) / distance) / distance
+    laplacian = -density.parameters.alpha * log_distance
+    for i, axis in enumerate(step * np.eye(x.shape[-1])):
         ahead, behind = (density.log_psi_gradient(x + sign * axis) for sign in (1.0, -1.0))
         laplacian = laplacian + (ahead - behind)[..., i] / (2.0 * step)
     return RantzerCondition(laplacian, np.sum(density.gradient(x, Gauge.LOG) ** 2, axis=-1))

@@ -8,6 +8,7 @@ from numpy.typing import ArrayLike
 
 from densarm.arms.arm import Arm
 from densarm.density.navigation_density import V_MIN, Gauge, NavigationDensity
+from densarm.errors import InvalidValueError
 from densarm.euclidean.implicit import ImplicitFunction
 from densarm.values.arrays import Array
 from densarm.values.checks import finite_vector, positive
@@ -36,11 +37,26 @@ class NavigationField(Protocol):
         ...
 
 
-def saturate(u: Array, u_max: float) -> Array:
-    """Return ū = u u_max/‖u‖∞ where controls (..., n) exceed u_max > 0, elsewhere u.
+def saturate(u: ArrayLike, u_max: float) -> Array:
+    r"""Bound controls in the maximum norm, and keep their directions.
+
+    .. math:: \bar u = u \min\left(1, \frac{u_{max}}{\|u\|_\infty}\right)
+
+    Args:
+        u: controls (..., n), in any unit.
+        u_max: bound > 0 in that unit; infinity for none.
+
+    Returns:
+        ū (..., n).
+
+    Raises:
+        InvalidValueError: a bound that is not positive.
 
     Source: [ZNV] eq. 13-14.
     """
+    if not u_max > 0.0:
+        raise InvalidValueError("u_max", u_max, "a number > 0, or infinity")
+    u = np.asarray(u, np.float64)
     largest = np.abs(u).max(axis=-1, keepdims=True)
     return u * (u_max / np.maximum(largest, u_max)) if np.isfinite(u_max) else u
 
@@ -167,8 +183,11 @@ class JointSpaceField:
         return gradient
 
     def height(self, x: Array) -> Array:
-        """Act as `NavigationField.height`: ln ρ, as `DensitySample.log_value` has it."""
-        values = [self.density.evaluate(q).log_value for q in _configurations(self._arm, x)]
+        """Act as `NavigationField.height`: ln ρ, as `NavigationDensity.log_value` has it."""
+        values = []
+        for q in _configurations(self._arm, x):
+            self.density.update(q)
+            values.append(self.density.log_value())
         return np.reshape(values, x.shape[:-1])
 
 

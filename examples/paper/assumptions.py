@@ -194,8 +194,6 @@ def main(arguments: list[str] | None = None) -> None:
     }
     alphas = {scene.name: scene.density.parameters.alpha for scene in every}
     promised = {name: 1.0 / a.largest_theta(1.0, alphas[name]) for name, a in found.items()}
-    paper.save_figure(draw_table(found, leaks, alphas), options.out, "assumptions_table")
-    paper.save_figure(draw_occupancy(leaks, promised), options.out, "assumptions_occupancy")
     paper.FigureReport(
         "The theorem's assumptions",
         "Every scene of Figs. 3 to 7 meets Assumption 2 of [ZNV], and the time that starts in and "
@@ -215,7 +213,11 @@ def main(arguments: list[str] | None = None) -> None:
                 for name, a in found.items()
             },
         },
-    ).write(options.out)
+    ).write(
+        options.out,
+        assumptions_table=draw_table(found, leaks, alphas),
+        assumptions_occupancy=draw_occupancy(leaks, promised),
+    )
 
 
 def scene_numbers(a: SceneAssumptions, by_theta: Leaks, alpha: float) -> dict[str, object]:

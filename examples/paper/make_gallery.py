@@ -9,18 +9,10 @@ from pathlib import Path
 FOLDER = Path(__file__).resolve().parent
 DOCS = FOLDER.parents[1] / "docs"
 
-CHOICES = """\
-What verdicts rest on where the paper leaves it open:
-
-- Fig. 1: the agreement is of totals within 10 %, with fine starts in the sensing regions; ∇·(ρk) is
-  negative in parts of them.
-- Fig. 4: the shapes' sizes, the maze and its sensing regions. A bowtie sensed along its notches
-  leaves some starts stuck.
-- Fig. 5: the shape of the C. With its tips turned in, r = 4.5 reaches for 3 of 1,000 starts only.
-  The paper's escapes at κ = 10 do not reproduce.
-- Fig. 6 and 7: gains of 5 and 10; at gain 1 a part of the starts is still under way at the end.
-- Fig. 8: V. The paper's product reaches from no start, the equally weighted sum from 70 %; the sum
-  weighted by the joints' inertia reaches from all, with the automatic cover and without.
+BEYOND = """\
+Where a figure departs from the paper, or chooses what that leaves open, is told with it, in its
+picture and in its result.json. What the library itself does otherwise is in
+[Departures from \\[ZNV\\]](departures.md).
 
 Beyond the figures, the nearest statements that hold:
 
@@ -46,10 +38,12 @@ def section(script: Path, pictures: Path) -> str:
         f"![{result['figure']}]({picture.relative_to(DOCS).as_posix()})"
         for picture in sorted(pictures.glob("*.png"))
     )
+    departures = "".join(f"- {each}\n" for each in result["departures"])
     numbers = (pictures / "result.json").relative_to(DOCS).as_posix()
     return (
         f"## {result['figure']}\n\n{images}\n\n{result['claim']} **{verdict}**\n"
         f"Numbers: [result.json]({numbers}). Script: `examples/paper/{script.name}`.\n"
+        + (f"\nDepartures from the paper:\n\n{departures}" if departures else "")
     )
 
 
@@ -73,7 +67,7 @@ def main(arguments: list[str] | None = None) -> None:
     introduction = (
         "# Gallery\n\nThe figures of A. Zheng, S. S. K. S. Narayanan, U. Vaidya, *Safe Navigation "
         "Using Density Functions*, IEEE RA-L 2023, each with its claim and whether it held.\n"
-        "`python examples/paper/make_gallery.py` makes this page.\n\n" + CHOICES
+        "`python examples/paper/make_gallery.py` makes this page.\n\n" + BEYOND + "\n"
     )
     (DOCS / "gallery.md").write_text(introduction + "\n".join(sections), encoding="utf-8")
 

@@ -151,7 +151,7 @@ def main(arguments: list[str] | None = None) -> None:
         for ratio in SLOW + FAST
     }
     free = continuous(UNBOUNDED_SPEED, starts[: max(1, options.starts // 10)])
-    paper.save_figure(draw(runs, free), options.out, "moving_scene")
+    figure = draw(runs, free)
     slow = [runs[ratio] for ratio in SLOW]
     settled = max(summary(each)["median_error_settled_m"] for each in slow)
     paper.FigureReport(
@@ -179,7 +179,7 @@ def main(arguments: list[str] | None = None) -> None:
                 "largest_error_at_the_end_m": float(free["error"][-1].max()),
             },
         },
-    ).write(options.out)
+    ).write(options.out, moving_scene=figure)
 
 
 if __name__ == "__main__":

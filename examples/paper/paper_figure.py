@@ -2,6 +2,7 @@
 
 import argparse
 import json
+import textwrap
 from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -11,14 +12,22 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.colors import to_rgba
 from matplotlib.figure import Figure
+from matplotlib.transforms import Bbox
 
 from densarm.euclidean.implicit import ImplicitFunction, smallest_value
+from densarm.euclidean.runs import PointRuns
 from densarm.values.arrays import Array
 from densarm.values.files import atomic_file
 from densarm.values.outcome import Outcome
 from densarm.visualization.figure_style import BLACK, GREY, OUTCOME_COLOUR, plane_grid
 
 RESULT_FILE = "result.json"
+THETA = (
+    "θ = 0, where the theorem asks for θ > 0: with θ > 0 starts close to an unsafe set enter it."
+)
+GAUGE = "Curves follow ∇ ln ρ, which has the direction of ∇ρ and not its length."
+NO_NUMBERS = "Sets, sensing regions and goal are chosen: the paper gives none."
+_LETTERS_PER_INCH, _LINE_HEIGHT = 17.0, 0.135  # of the text at a picture's foot [in]
 
 
 @dataclass(frozen=True)
@@ -33,18 +42,25 @@ class FigureReport:
     """Whether the numbers bear the claim out."""
     numbers: dict[str, Any]
     """The numbers, by name with their unit; JSON values."""
+    departures: tuple[str, ...] = ()
+    """Where it departs from the paper, or chooses what that leaves open, a sentence each: the
+    picture's foot, result.json and the gallery have them from here."""
 
-    def write(self, folder: Path) -> None:
-        """Write result.json into an existing folder and print the verdict.
+    def write(self, folder: Path, **pictures: Figure) -> None:
+        """Write result.json and the pictures, by name, into an existing folder; print the verdict.
 
         Raises:
-            FileContentError: the file cannot be written.
+            FileContentError: a file cannot be written.
         """
+        for name, picture in pictures.items():
+            save_figure(picture, folder, name, self.departures)
         text = json.dumps(asdict(self), indent=2, ensure_ascii=False)
         with atomic_file(folder / RESULT_FILE) as file:
             file.write((text + "\n").encode())
         verdict = "holds" if self.holds else "does not hold"
         print(f"{self.figure}: {self.claim}\n  {verdict}; see {folder / RESULT_FILE}")
+        for departure in self.departures:
+            print(f"  departs: {departure}")
 
 
 @dataclass(frozen=True)
@@ -75,17 +91,61 @@ def figure_arguments(
     return FigureArguments(parsed.out, parsed.starts)
 
 
-def save_figure(figure: Figure, folder: Path, name: str) -> list[Path]:
-    """Write a figure as NAME.png and NAME.pdf into a folder and return both paths.
+def blend_departure(radius: float) -> str:
+    """Return how the control is blended at the goal, within two radii [m]."""
+    return (
+        "Near the goal the control is blended into −e as Remark 2 has it, with τ = 2 − ‖e‖/δ and "
+        f"δ = {radius:g} m, which the paper leaves open."
+    )
+
+
+def arrivals(runs: PointRuns, radius: float) -> dict[str, int]:
+    """Return how many of the runs arrive within a radius [m] in 120 and in 1200 s."""
+    late = [np.searchsorted(runs.time, limit + 1e-6) - 1 for limit in (120.0, 1200.0)]
+    soon, all_told = (int((runs.error[k] <= radius).sum()) for k in late)
+    return {
+        "starts": runs.error.shape[1],
+        "collided": runs.count(Outcome.COLLIDED),
+        "reached_within_120_s": soon,
+        "reached_within_1200_s": all_told,
+    }
+
+
+def gain_departure(alpha: float, gain: float, plain: dict[str, Any]) -> str:
+    """Return what α and gain run, and how many starts arrive, in s, by α = 1 and no gain."""
+    soon, all_told = plain["reached_within_120_s"], plain["reached_within_1200_s"]
+    return (
+        f"α = {alpha:g} and a gain of {gain:g}: the paper finds α of 1 to 10 to work, and has no "
+        f"gain. With α = 1 and none, of {plain['starts']} starts {soon} arrive in 120 s and "
+        f"{all_told} in 1200 s."
+    )
+
+
+def save_figure(
+    figure: Figure, folder: Path, name: str, departures: Sequence[str] = ()
+) -> list[Path]:
+    """Write a figure, departures at its foot, as NAME.png and NAME.pdf; return both paths.
 
     Raises:
         FileContentError: a file cannot be written.
     """
+    width, height = figure.get_size_inches()
+    foot = 0.0
+    if departures:
+        letters = int(_LETTERS_PER_INCH * width)
+        lines = [
+            textwrap.fill(f"– {each}", letters, subsequent_indent="   ") for each in departures
+        ]
+        text = "\n".join(["Departures from the paper:", *lines])
+        # Below the figure, whose layout it so leaves alone.
+        figure.text(0.1 / width, 0.0, text, fontsize=7.5, va="top")
+        foot = _LINE_HEIGHT * (text.count("\n") + 2)
     paths = [folder / f"{name}.{kind}" for kind in ("png", "pdf")]
     for path in paths:
         metadata = {"CreationDate": None} if path.suffix == ".pdf" else None
+        shown = Bbox.from_bounds(0.0, -foot, width, height + foot)
         with atomic_file(path) as file:
-            figure.savefig(file, format=path.suffix[1:], metadata=metadata)
+            figure.savefig(file, format=path.suffix[1:], metadata=metadata, bbox_inches=shown)
     return paths
 
 

@@ -187,8 +187,6 @@ def main(arguments: list[str] | None = None) -> None:
         (theta, alpha): Proportion(entered(alpha, theta, options.starts), options.starts)
         for theta, alpha in pairs
     }
-    paper.save_figure(draw_maps(), options.out, "rantzer_maps")
-    paper.save_figure(draw_shares(shares, leaks), options.out, "rantzer_shares")
     numbers = report(shares, leaks, options.starts, len(x))
     paper.FigureReport(
         "Rantzer's condition",
@@ -197,7 +195,11 @@ def main(arguments: list[str] | None = None) -> None:
         "unsafe set.",
         numbers["fewest_starts_that_enter_where_it_holds_everywhere"] == 0,
         numbers,
-    ).write(options.out)
+    ).write(
+        options.out,
+        rantzer_maps=draw_maps(),
+        rantzer_shares=draw_shares(shares, leaks),
+    )
 
 
 def largest_difference(thresholds: dict[Gauge, dict[int, float | None]]) -> float:

@@ -1,6 +1,7 @@
 """DensityTracking: its one kernel is the law of its parts, whichever pairs are queried."""
 
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -76,6 +77,30 @@ def test_torque_is_that_of_its_parts(panda: Arm, panda_swing: Motion, among_sphe
         assert controller.tracking_error == pytest.approx(error, rel=1e-9)
         sensed += density.log_psi < 0.0
     assert sensed > 10
+
+
+def test_the_formula_of_the_readme_is_the_one_that_runs(
+    swing_up: Scenario, swing_up_motion: Motion
+) -> None:
+    readme = (Path(__file__).parents[2] / "README.md").read_text(encoding="utf-8")
+    assert "τ = H + M (q̈_d + K_p ∇(−1/ρ) − K_v ė)" in readme
+    arm, world, motion = swing_up.arm, World(swing_up.arm, swing_up.scene), swing_up_motion
+    controller = DensityTracking(world, motion, gains=GAINS)
+    density = tracked_density(world, motion)
+    for t, q, v in states(arm, motion, off=1e-3, every=200):
+        point = motion.sample(t, lead=0.5 * motion.period)
+        density.set_goal(arm.configuration(point.position))
+
+        def descent(x: Array, q: Array = q) -> float:
+            """−1/ρ at q ⊕ x, by its value alone."""
+            return -float(np.exp(-density.evaluate(arm.integrate(q, x)).log_value))
+
+        slope = [(descent(x) - descent(-x)) / 2e-6 for x in 1e-6 * np.eye(arm.nv)]
+        wanted = point.acceleration + GAINS.position * np.array(slope)
+        wanted -= GAINS.velocity * (v - point.velocity)
+        expected = arm.nonlinear_effects(q, v) + arm.mass_matrix(q) @ wanted
+        assert (np.abs(expected) < arm.limits.effort).all()  # where nothing is scaled down
+        np.testing.assert_allclose(controller.torque(t, q, v), expected, rtol=1e-4, atol=1e-4)
 
 
 def test_torque_is_that_of_all_pairs_to_the_last_bit(

@@ -170,3 +170,9 @@ def test_distance_of_a_point() -> None:
     assert distance_from(np.array([1.0, 3.0]), ellipse, rim) == pytest.approx(2.0, abs=1e-6)
     assert distance_from(np.array([1.5, 0.2]), ellipse, rim) == 0.0
     assert distance_from(np.zeros(2), ellipse, rim[:0]) == 0.0
+
+
+def test_refuses_a_weighted_density() -> None:
+    density = EuclideanDensity([disc(1.0, 1.6)], GOAL, weights=[2.0, 1.0])
+    with pytest.raises(InvalidValueError, match="weights of V"):
+        check_assumptions(density, SQUARE, side=10)

@@ -3,7 +3,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import assume, given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
@@ -13,6 +13,7 @@ from densarm.density.goal_distance import EuclideanDistance
 from densarm.density.navigation_density import DensityParameters, Gauge, NavigationDensity
 from densarm.density.rantzer import rantzer_condition
 from densarm.density.unsafe_sets import ImplicitSet
+from densarm.errors import InvalidValueError
 from densarm.euclidean.density import EuclideanDensity, rantzer_map
 from densarm.euclidean.implicit import ImplicitFunction, Placed, UnsafeRegion
 from densarm.euclidean.shapes import Ball, CShape, Egg, Ellipsoid, PNormBall
@@ -59,6 +60,43 @@ def test_agrees_with_the_density_of_single_points(x: Array, parameters: DensityP
     expected = np.array([sample.blended_gradient() for sample in samples])
     scale = np.abs(expected).max(axis=1, keepdims=True) + 1e-300
     np.testing.assert_allclose(batch.direction(x) / scale, expected / scale, atol=1e-12)
+
+
+positive_weights = arrays(np.float64, 2, elements=st.floats(0.1, 10.0))
+
+
+@given(x=clouds, weights=positive_weights, alpha=st.sampled_from([0.5, 1.0, 3.0]))
+def test_weights_stretch_the_goal_distance_along_each_axis(
+    x: Array, weights: Array, alpha: float
+) -> None:
+    parameters = DensityParameters(alpha, gauge=Gauge.LOG)
+    density = EuclideanDensity([], GOAL, parameters, weights)
+    stretched = EuclideanDensity([], np.sqrt(weights) * GOAL, parameters)
+    assume(np.linalg.norm(x - GOAL, axis=1).min() > 0.1)
+    np.testing.assert_allclose(density.log_value(x), stretched.log_value(np.sqrt(weights) * x))
+    np.testing.assert_allclose(
+        density.direction(x),
+        np.sqrt(weights) * stretched.direction(np.sqrt(weights) * x),
+        atol=1e-12,
+    )
+
+
+@given(weights=positive_weights)
+def test_the_map_of_a_weighted_density_is_its_laplacian(weights: Array) -> None:
+    density = EuclideanDensity([UnsafeRegion(Ball(1.0), Ball(2.0))], GOAL, weights=weights)
+    x, step = np.array([[-1.0, 1.2], [4.0, 2.0]]), 1e-3
+    total = -4.0 * density.log_value(x)
+    for axis in step * np.eye(2):
+        total += density.log_value(x + axis) + density.log_value(x - axis)
+    np.testing.assert_allclose(
+        rantzer_map(density, x).laplacian, total / step**2, rtol=1e-3, atol=1e-5
+    )
+
+
+@pytest.mark.parametrize("weights", [[1.0, 0.0], [1.0, -2.0], [1.0], [1.0, 1.0, 1.0]])
+def test_refuses_weights_that_are_not_one_positive_number_per_axis(weights: list[float]) -> None:
+    with pytest.raises(InvalidValueError, match="weights"):
+        EuclideanDensity([], GOAL, weights=weights)
 
 
 def test_any_batch_shape() -> None:

@@ -96,3 +96,9 @@ def test_keeps_the_direction_and_the_bound(u: Array, u_max: float) -> None:
 def test_infinity_bounds_nothing() -> None:
     u = np.array([1e300, -1.0])
     np.testing.assert_array_equal(saturate(u, np.inf), u)
+
+
+@pytest.mark.parametrize("u_max", [0.0, -1.0, np.nan])
+def test_refuses_a_bound_that_is_not_positive(u_max: float) -> None:
+    with pytest.raises(InvalidValueError, match="u_max"):
+        saturate(np.ones(2), u_max)
