@@ -32,8 +32,7 @@ _MEASURED = {
 @click.option(
     "--methods",
     metavar="A,B,...",
-    help="Some of density, density_direct, potential_field, navigation_function, cbf_qp, "
-    "plan_then_track.  [default: all]",
+    help="Some of those below.  [default: all]",
 )
 @number_option("--starts", 5, "Starts: the scenario's own, the others at random.")
 @number_option(
@@ -67,12 +66,14 @@ def compare(
     from other starts; what reaches most often, then fastest, is taken.
 
     \b
-    density              tracks a planned, timed curve by density (sensing distance)
-    density_direct       follows the plain density to the goal (sensing distance)
-    potential_field      Khatib 1986 (influence distance)
-    navigation_function  Rimon, Koditschek 1992 (kappa)
-    cbf_qp               the goal's pull, filtered by barrier functions (barrier rate)
-    plan_then_track      the curve of `density` by computed torque (sensing distance)
+    density               tracks a planned, timed curve by density (sensing distance)
+    density_direct        follows the plain density to the goal (sensing distance)
+    density_time_varying  the same of obstacles that move, 2024 (sensing distance)
+    control_density       the control density program, 2024 (sensing distance)
+    potential_field       Khatib 1986 (influence distance)
+    navigation_function   Rimon, Koditschek 1992 (kappa)
+    cbf_qp                the goal's pull, filtered by barrier functions (barrier rate)
+    plan_then_track       the curve of `density` by computed torque (sensing distance)
 
     The exit status is 0 when the comparison was completed, whatever was reached.
 
