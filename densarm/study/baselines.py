@@ -1,8 +1,8 @@
 """Baselines: the density and what it is compared with, by name, from a scenario to its drive."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -60,7 +60,7 @@ def density_direct(scenario: Scenario, scale: float = 1.0) -> Drive:
     return _by_density(scenario, scale, ControlForm.REGULATION, "direct")
 
 
-def density_time_varying(scenario: Scenario, scale: float = 1.0) -> Drive:
+def density_moving(scenario: Scenario, scale: float = 1.0) -> Drive:
     """Follow the density of obstacles that move to the goal."""
     arm, sensing = scenario.arm, _scaled(scenario, scale)
     field = TimeVaryingDensity(
@@ -110,7 +110,7 @@ def plan_then_track(scenario: Scenario, scale: float = 1.0) -> Drive:
 BASELINES: Mapping[str, Baseline] = {
     "density": density,
     "density_direct": density_direct,
-    "density_time_varying": density_time_varying,
+    "density_moving": density_moving,
     "control_density": control_density,
     "potential_field": potential_field,
     "navigation_function": navigation_function,
@@ -119,17 +119,32 @@ BASELINES: Mapping[str, Baseline] = {
 }
 """The baselines by name, and the density beside them."""
 
-MAIN_PARAMETERS: Mapping[str, str] = {
-    "density": "sensing distance",
-    "density_direct": "sensing distance",
-    "density_time_varying": "sensing distance",
-    "control_density": "sensing distance",
-    "potential_field": "influence distance",
-    "navigation_function": "κ",
-    "cbf_qp": "barrier rate",
-    "plan_then_track": "sensing distance",
+
+class MainParameter(NamedTuple):
+    """What a comparison tunes of a baseline."""
+
+    name: str
+    unit: str
+    default: Callable[[Scenario], float]
+    """Its value at a scale of one."""
+
+
+_SENSING = MainParameter("sensing distance", "m", lambda scenario: scenario.sensing.distance)
+
+MAIN_PARAMETERS: Mapping[str, MainParameter] = {
+    "density": _SENSING,
+    "density_direct": _SENSING,
+    "density_moving": _SENSING,
+    "control_density": _SENSING,
+    "potential_field": _SENSING._replace(name="influence distance"),
+    "navigation_function": MainParameter("κ", "", lambda _: _KAPPA),
+    "cbf_qp": MainParameter("barrier rate", "1/s", lambda _: _BARRIER_RATE),
+    "plan_then_track": _SENSING,
 }
-"""What `scale` scales: the scenario's sensing distance, or the default of the baseline's own."""
+"""What `scale` scales."""
+
+DENSITIES = ("density", "density_direct", "density_moving", "control_density")
+"""The baselines that are forms of the density."""
 
 
 class ComputedTorque:
@@ -198,6 +213,7 @@ def _scaled(scenario: Scenario, scale: float) -> SensingParameters:
 def _by_density(scenario: Scenario, scale: float, form: ControlForm, guide: str) -> Drive:
     control = replace(scenario.control, form=form, guide=guide)
     chosen = replace(scenario, control=control, sensing=_scaled(scenario, scale))
+    vars(chosen)["world"] = scenario.world  # not one of its own, in which nothing would move
     return by_density(chosen, replans=False)
 
 

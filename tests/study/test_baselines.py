@@ -23,7 +23,7 @@ from densarm.values.outcome import Outcome
 
 FIELDS = [
     "density_direct",
-    "density_time_varying",
+    "density_moving",
     "potential_field",
     "navigation_function",
     "cbf_qp",
