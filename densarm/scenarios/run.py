@@ -23,6 +23,7 @@ from densarm.planning.guide import Guide, GuidePath
 from densarm.planning.motion import Motion, PlanningError
 from densarm.planning.plan import GUIDES, inside_limits, plan_motion, plan_path
 from densarm.scenarios.scenario import ControlForm, Scenario, load_scenario
+from densarm.simulation.plants import Plant
 from densarm.simulation.run import Run
 from densarm.simulation.simulate import OnProgress, simulate_task
 from densarm.values.arrays import Array
@@ -80,8 +81,13 @@ def run(
     return run_by(chosen, lambda scenario: by_density(scenario, own), on_progress)
 
 
-def run_by(scenario: Scenario, baseline: Baseline, on_progress: OnProgress = lambda _: None) -> Run:
-    """Run a scenario's closed loop by any way to drive the arm, as `run`."""
+def run_by(
+    scenario: Scenario,
+    baseline: Baseline,
+    on_progress: OnProgress = lambda _: None,
+    plant: Plant | None = None,
+) -> Run:
+    """Run a scenario's closed loop by any way to drive the arm, or another plant, as `run`."""
     began = time.perf_counter()
     world, task = scenario.world, scenario.task
     on_progress("planning")
@@ -92,7 +98,7 @@ def run_by(scenario: Scenario, baseline: Baseline, on_progress: OnProgress = lam
         searched = error.outcome == Outcome.NO_PATH
         return replace(ended, plan_time=time.perf_counter() - began if searched else 0.0)
     elapsed = time.perf_counter() - began
-    done = simulate_task(task, world, drive.controller, on_progress=on_progress)
+    done = simulate_task(task, world, drive.controller, plant, on_progress)
     if done.outcome == Outcome.INFEASIBLE:
         return done
     led_by, stuck = (drive.path.found_by, drive.path.stuck) if drive.path else ("", "")

@@ -1,8 +1,8 @@
 """Baselines: the density and what it is compared with, by name, from a scenario to its drive."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -11,12 +11,14 @@ from densarm.arms.arm import Arm
 from densarm.arms.joint_space import joint_error, write_configuration
 from densarm.control.controller import Gains, checked_state
 from densarm.control.inverse_dynamics import InverseDynamics
-from densarm.control.regulation import FieldRegulation
+from densarm.control.regulation import FieldRegulation, VelocityField
 from densarm.control.speed_law import SpeedLaw
 from densarm.density.goal_distance import TorusDistance
+from densarm.density.unsafe_sets import SensingParameters
 from densarm.planning.motion import Motion, PlanningError
 from densarm.scenarios.run import Drive, by_density
 from densarm.scenarios.scenario import ControlForm, Scenario
+from densarm.study.control_density import ControlDensity
 from densarm.study.fields import (
     BarrierField,
     BarrierFilter,
@@ -24,6 +26,7 @@ from densarm.study.fields import (
     JointNavigationFunction,
     JointPotentialField,
 )
+from densarm.study.time_varying_density import TimeVaryingDensity
 from densarm.values.arrays import Array
 from densarm.values.kernels import compiled
 from densarm.values.outcome import Outcome
@@ -57,6 +60,29 @@ def density_direct(scenario: Scenario, scale: float = 1.0) -> Drive:
     return _by_density(scenario, scale, ControlForm.REGULATION, "direct")
 
 
+def density_moving(scenario: Scenario, scale: float = 1.0) -> Drive:
+    """Follow the density of obstacles that move to the goal."""
+    arm, sensing = scenario.arm, _scaled(scenario, scale)
+    field = TimeVaryingDensity(
+        scenario.world,
+        scenario.goal,
+        TorusDistance(arm, scenario.density.weights, scenario.control.kappa),
+        sensing,
+        scenario.control.margin,
+        scenario.gains,
+        scenario.simulation.control_period,
+    )
+    return _regulated(scenario, field)
+
+
+def control_density(scenario: Scenario, scale: float = 1.0) -> Drive:
+    """Follow the shortest velocity along which the density's flow does not contract."""
+    distance = TorusDistance(scenario.arm, scenario.density.weights, scenario.control.kappa)
+    sensing, margin = _scaled(scenario, scale), scenario.control.margin
+    field = ControlDensity(scenario.world, scenario.goal, distance, sensing, margin, scenario.gains)
+    return _regulated(scenario, field)
+
+
 def potential_field(scenario: Scenario, scale: float = 1.0) -> Drive:
     """Follow Khatib's artificial potential; it repels where the density senses."""
     sensing = scenario.sensing
@@ -84,6 +110,8 @@ def plan_then_track(scenario: Scenario, scale: float = 1.0) -> Drive:
 BASELINES: Mapping[str, Baseline] = {
     "density": density,
     "density_direct": density_direct,
+    "density_moving": density_moving,
+    "control_density": control_density,
     "potential_field": potential_field,
     "navigation_function": navigation_function,
     "cbf_qp": cbf_qp,
@@ -91,15 +119,32 @@ BASELINES: Mapping[str, Baseline] = {
 }
 """The baselines by name, and the density beside them."""
 
-MAIN_PARAMETERS: Mapping[str, str] = {
-    "density": "sensing distance",
-    "density_direct": "sensing distance",
-    "potential_field": "influence distance",
-    "navigation_function": "κ",
-    "cbf_qp": "barrier rate",
-    "plan_then_track": "sensing distance",
+
+class MainParameter(NamedTuple):
+    """What a comparison tunes of a baseline."""
+
+    name: str
+    unit: str
+    default: Callable[[Scenario], float]
+    """Its value at a scale of one."""
+
+
+_SENSING = MainParameter("sensing distance", "m", lambda scenario: scenario.sensing.distance)
+
+MAIN_PARAMETERS: Mapping[str, MainParameter] = {
+    "density": _SENSING,
+    "density_direct": _SENSING,
+    "density_moving": _SENSING,
+    "control_density": _SENSING,
+    "potential_field": _SENSING._replace(name="influence distance"),
+    "navigation_function": MainParameter("κ", "", lambda _: _KAPPA),
+    "cbf_qp": MainParameter("barrier rate", "1/s", lambda _: _BARRIER_RATE),
+    "plan_then_track": _SENSING,
 }
-"""What `scale` scales: the scenario's sensing distance, or the default of the baseline's own."""
+"""What `scale` scales."""
+
+DENSITIES = ("density", "density_direct", "density_moving", "control_density")
+"""The baselines that are forms of the density."""
 
 
 class ComputedTorque:
@@ -161,24 +206,33 @@ def _write_error(wanted: Array, q: Array, joint_index: NDArray[np.int64], out: A
     return float(np.abs(out).max())
 
 
+def _scaled(scenario: Scenario, scale: float) -> SensingParameters:
+    return replace(scenario.sensing, distance=scale * scenario.sensing.distance)
+
+
 def _by_density(scenario: Scenario, scale: float, form: ControlForm, guide: str) -> Drive:
-    chosen = replace(
-        scenario,
-        control=replace(scenario.control, form=form, guide=guide),
-        sensing=replace(scenario.sensing, distance=scale * scenario.sensing.distance),
-    )
+    control = replace(scenario.control, form=form, guide=guide)
+    chosen = replace(scenario, control=control, sensing=_scaled(scenario, scale))
+    vars(chosen)["world"] = scenario.world  # not one of its own, in which nothing would move
     return by_density(chosen, replans=False)
 
 
 def _follow(scenario: Scenario, field: type[BarrierField], *parameters: float) -> Drive:
-    """Return what follows a field; each gets the same distances, margin, pull and speed law."""
+    """Return what follows a field; each gets the same distances, margin and pull."""
+    distance, gains = (
+        TorusDistance(scenario.arm, scenario.density.weights, scenario.control.kappa),
+        scenario.gains,
+    )
+    barriers = Barriers(scenario.world, scenario.control.margin)
+    return _regulated(scenario, field(barriers, scenario.goal, distance, gains.rate, *parameters))
+
+
+def _regulated(scenario: Scenario, field: VelocityField) -> Drive:
+    """Return what follows a field between feasible ends, under the scenario's speed law."""
     world, margin = scenario.world, scenario.control.margin
     ends = {"start": scenario.start, "goal": scenario.goal}
     if fault := infeasibility(SweptCheck(world, margin), ends):
         raise PlanningError(Outcome.INFEASIBLE, fault)
-    weights, gains = scenario.density.weights, scenario.gains
-    distance = TorusDistance(scenario.arm, weights, scenario.control.kappa)
-    followed = field(Barriers(world, margin), scenario.goal, distance, gains.rate, *parameters)
     law = SpeedLaw(world, margin, scenario.speed)
     period = scenario.simulation.control_period
-    return Drive(FieldRegulation(scenario.arm, followed, law, gains, period))
+    return Drive(FieldRegulation(scenario.arm, field, law, scenario.gains, period))

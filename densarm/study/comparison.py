@@ -1,8 +1,8 @@
-"""Comparison: every baseline from every start, under the same limits, margins, tuning and seeds."""
+"""Comparison: every baseline from every start, under the same conditions, limits and tuning."""
 
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, field, fields, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -15,7 +15,8 @@ from densarm.planning.motion import TimingParameters
 from densarm.scenarios.run import Drive, run_by
 from densarm.scenarios.scenario import ControlForm, Scenario
 from densarm.simulation.simulate import OnProgress
-from densarm.study.baselines import BASELINES, MAIN_PARAMETERS
+from densarm.study.baselines import BASELINES, DENSITIES, MAIN_PARAMETERS
+from densarm.study.conditions import Condition
 from densarm.study.problems import path_length
 from densarm.values.arrays import Array
 from densarm.values.checks import non_negative_integer, positive_integer
@@ -28,9 +29,7 @@ if TYPE_CHECKING:
 LIMIT_SHARE = 0.9
 """Share of the velocity, acceleration and torque limits that every baseline plans with."""
 
-SCALES = (1.0, 0.2, 5.0)
-"""Multiples of the default of its main parameter that tuning tries on every baseline."""
-
+_WIDEST = 5.0  # factor of the default of a main parameter that tuning tries, and its inverse
 _TUNING_SEED = 1_000_003  # added to the seed of the starts that are not tuned on
 _START_MARGIN = 0.005  # [m], that random starts keep beyond the safety margin
 _PANELS = {  # of the figure: label and scale of a measure
@@ -68,23 +67,27 @@ class BaselineRun:
     """Median wall-clock time of one call of the controller [µs]; None where it had none."""
 
 
-MEASURES = tuple(field.name for field in fields(BaselineRun)[3:])
+MEASURES = tuple(item.name for item in fields(BaselineRun)[3:])
 """What is measured on a run, as `BaselineRun` calls it."""
 
 
 @dataclass(frozen=True)
 class BaselineResult:
-    """One baseline from all starts."""
+    """One baseline from all starts under one condition."""
 
     baseline: str
     runs: tuple[BaselineRun, ...]
     scale: float = 1.0
     """Of its main parameter, as tuning chose it."""
+    value: float = 0.0
+    """Of that parameter, in the unit of `MAIN_PARAMETERS`."""
+    condition: Condition = field(default_factory=Condition)
+    """What was done to the arm."""
 
     @property
     def parameter(self) -> str:
         """Name of its main parameter."""
-        return MAIN_PARAMETERS[self.baseline]
+        return MAIN_PARAMETERS[self.baseline].name
 
     def count(self, outcome: str) -> int:
         """Return the number of runs that ended so."""
@@ -104,8 +107,10 @@ class BaselineResult:
         """Return JSON data."""
         return {
             "method": self.baseline,
+            "condition": vars(self.condition),
             "parameter": self.parameter,
             "scale": self.scale,
+            "value": self.value,
             **{outcome: self.count(outcome) for outcome in RUN_ENDS},
             **{measure: self.median(measure) for measure in MEASURES},
             "runs": [vars(run) for run in self.runs],
@@ -114,18 +119,37 @@ class BaselineResult:
 
 @dataclass(frozen=True)
 class Comparison:
-    """All baselines from all starts."""
+    """All baselines from all starts under all conditions."""
 
     scenario: str
     seed: int
     baselines: tuple[BaselineResult, ...]
+    """Condition by condition, in each the baselines in their order."""
     tuning_starts: int
     """Number of other starts that the main parameters were tuned on."""
+    budget: int = 1
+    """Number of values that each main parameter was tried at."""
 
     @property
     def starts(self) -> int:
         """Number of starts."""
         return len(self.baselines[0].runs)
+
+    def under(self, condition: Condition) -> list[BaselineResult]:
+        """Return the results under a condition."""
+        return [result for result in self.baselines if result.condition == condition]
+
+    @property
+    def conditions(self) -> tuple[Condition, ...]:
+        """The conditions."""
+        return tuple(dict.fromkeys(result.condition for result in self.baselines))
+
+    def rivals(self, condition: Condition) -> tuple[BaselineResult, BaselineResult] | None:
+        """Return the best form of the density and the best other baseline, if there are both."""
+        results = self.under(condition)
+        ours = [result for result in results if result.baseline in DENSITIES]
+        others = [result for result in results if result.baseline not in DENSITIES]
+        return (best_of(ours), best_of(others)) if ours and others else None
 
     def to_json(self) -> dict[str, Any]:
         """Return JSON data; the measures of a baseline are medians."""
@@ -135,6 +159,7 @@ class Comparison:
             "scenario": self.scenario,
             "seed": self.seed,
             "tuning_starts": self.tuning_starts,
+            "budget": self.budget,
             "limit_share": LIMIT_SHARE,
         }
 
@@ -146,30 +171,36 @@ def compare(
     seed: int | None = None,
     tuning_starts: int = 3,
     on_progress: OnProgress = lambda _: None,
+    *,
+    conditions: Sequence[Condition] = (Condition(),),
+    budget: int = 3,
 ) -> Comparison:
     """Run baselines from the same starts to the scenario's goal.
 
     All get the same arm, scene, margin, time step, time limit and gains, and plan with
     `LIMIT_SHARE` of the velocity, acceleration and torque limits; feedback may use them whole.
-    Every baseline has one main parameter, `MAIN_PARAMETERS`, and all are tuned alike: of its
-    default times each of `SCALES` the one that reaches from most tuning starts, then the one of the
-    smallest median time, then the first. Tuning starts are drawn by another seed than the starts.
+    Every baseline has one main parameter, `MAIN_PARAMETERS`, and all are tuned alike: of as many
+    values as the budget, its default times `scales`, the one that reaches most often from the
+    tuning starts, all conditions counted, then touches least often, then has the smallest median
+    time, then the first. Tuning starts are drawn by another seed than the starts.
 
     Args:
         scenario: arm, scene, goal, limits and parameters; its own start comes first.
         baselines: names of `BASELINES`, at least one.
         starts: number of starts; all but the first are random and touch nothing.
-        seed: of the starts and of the planner; None for the scenario's own.
+        seed: of the starts, the planner and the conditions; None for the scenario's own.
         tuning_starts: number of starts to tune on; 0 keeps the defaults.
         on_progress: told what is being done.
+        conditions: what is done to the arm; every baseline meets the same from the same start.
+        budget: number of values of its main parameter that tuning tries on every baseline.
 
     Returns:
         How each run ended. A run that raises an error counts as failed and stops no other.
 
     Raises:
         UnknownNameError: a baseline that there is not.
-        InvalidValueError: a number of starts below one, of tuning starts below zero, a seed that
-            is not a whole number, or a scenario that commands velocities.
+        InvalidValueError: a number of starts or a budget below one, of tuning starts below zero, a
+            seed that is not a whole number, or a scenario that commands velocities.
         DensarmError: no random start was found.
     """
     for name in baselines:
@@ -186,23 +217,54 @@ def compare(
     )
     n_others = positive_integer("starts", starts) - 1
     n_tuning = non_negative_integer("tuning_starts", tuning_starts)
+    tried = scales(positive_integer("budget", budget))
     margin = scenario.control.margin + _START_MARGIN
     others = clear_configurations(scenario.world, n_others, seed, margin)
     tuning = clear_configurations(scenario.world, n_tuning, seed + _TUNING_SEED, margin)
 
-    def runs(name: str, scale: float, over: Sequence[Array], what: str) -> BaselineResult:
+    def runs(name: str, scale: float, condition: Condition, is_tuning: bool) -> BaselineResult:
+        over, what = (tuning, "tuning start") if is_tuning else ([scenario.start, *others], "start")
         done = []
         for k, start in enumerate(over):
-            on_progress(f"{name} from {what} {k + 1} of {len(over)}")
-            done.append(_run(replace(scenario, start=start), name, scale))
-        return BaselineResult(name, tuple(done), scale)
+            under = "" if condition == Condition() else f" under {condition.name}"
+            on_progress(f"{name} from {what} {k + 1} of {len(over)}{under}")
+            drawn = (seed + _TUNING_SEED * is_tuning, k)
+            done.append(_run(replace(scenario, start=start), name, scale, condition, drawn))
+        value = scale * MAIN_PARAMETERS[name].default(scenario) if name in MAIN_PARAMETERS else 0.0
+        return BaselineResult(name, tuple(done), scale, value, condition)
 
-    results = []
-    for name in dict.fromkeys(baselines):
-        tried = [runs(name, scale, tuning, "tuning start") for scale in SCALES if tuning]
-        scale = min(tried, key=_rank).scale if tried else 1.0
-        results.append(runs(name, scale, [scenario.start, *others], "start"))
-    return Comparison(scenario.name, seed, tuple(results), tuning_starts)
+    def tuned(name: str) -> float:
+        if not tuning:
+            return 1.0
+        results = [
+            replace(per[0], runs=tuple(run for result in per for run in result.runs))
+            for scale in tried
+            if (per := [runs(name, scale, condition, True) for condition in conditions])
+        ]
+        return best_of(results).scale
+
+    chosen = {name: tuned(name) for name in dict.fromkeys(baselines)}
+    found = [
+        runs(name, scale, condition, False)
+        for condition in conditions
+        for name, scale in chosen.items()
+    ]
+    return Comparison(scenario.name, seed, tuple(found), tuning_starts, budget)
+
+
+def scales(budget: int) -> list[float]:
+    """Return as many multiples of a default: one, then ever farther below and above, to 1/5 and 5.
+
+    They are even in their logarithms; a budget of three has 1, 0.2 and 5.
+    """
+    rounds = max(1, budget // 2)
+    steps = [sign * k / rounds for k in range(1, rounds + 1) for sign in (-1.0, 1.0)]
+    return [1.0, *(_WIDEST**step for step in steps)][:budget]
+
+
+def best_of(results: Sequence[BaselineResult]) -> BaselineResult:
+    """Return the first that reaches most often, then touches least, then is the fastest."""
+    return min(results, key=_rank)
 
 
 def comparison_figure(comparison: Comparison) -> "Figure":
@@ -230,7 +292,7 @@ def comparison_figure(comparison: Comparison) -> "Figure":
     outcomes.set_xlim(0, comparison.starts)
     outcomes.set_xlabel("runs")
     outcomes.xaxis.set_major_locator(MaxNLocator(integer=True))
-    outcomes.set_yticks(rows, [result.baseline for result in results])
+    outcomes.set_yticks(rows, [_label(result) for result in results])
     for axes, (measure, (label, scale)) in zip(panels, _PANELS.items(), strict=True):
         for row, result in enumerate(results):
             values = scale * np.array(result.values(measure))
@@ -245,6 +307,11 @@ def comparison_figure(comparison: Comparison) -> "Figure":
     outcomes.set_ylim(len(rows) - 0.5, -0.5)
     figure.legend(loc="outside lower center", ncols=len(RUN_ENDS), frameon=False)
     return figure
+
+
+def _label(result: BaselineResult) -> str:
+    is_disturbed = result.condition != Condition()
+    return f"{result.baseline}, {result.condition.name}" if is_disturbed else result.baseline
 
 
 class TimedController:
@@ -270,13 +337,15 @@ class TimedController:
         return tau
 
 
-def _rank(result: BaselineResult) -> tuple[int, float]:
-    """Return what orders results from the best: fewest failures, then the smallest median time."""
+def _rank(result: BaselineResult) -> tuple[int, int, float]:
     median = result.median("time_s")
-    return -result.count(Outcome.REACHED), np.inf if median is None else median
+    reached, touched = result.count(Outcome.REACHED), result.count(Outcome.COLLIDED)
+    return -reached, touched, np.inf if median is None else median
 
 
-def _run(scenario: Scenario, name: str, scale: float) -> BaselineRun:
+def _run(
+    scenario: Scenario, name: str, scale: float, condition: Condition, seed: tuple[int, int]
+) -> BaselineRun:
     seconds: list[float] = []
 
     def baseline(scenario: Scenario) -> Drive:
@@ -285,7 +354,8 @@ def _run(scenario: Scenario, name: str, scale: float) -> BaselineRun:
 
     start = tuple(scenario.arm.angles(scenario.start).tolist())
     try:
-        run = run_by(scenario, baseline)
+        scenario, plant = condition.applied(scenario, seed)
+        run = run_by(scenario, baseline, plant=plant)
     except (ValueError, ArithmeticError, RuntimeError) as error:
         return BaselineRun(start, FAILED, str(error))
     smallest = float(run.clearance.min())

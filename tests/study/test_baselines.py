@@ -21,7 +21,13 @@ from densarm.study.baselines import BASELINES, ComputedTorque
 from densarm.values.arrays import Array
 from densarm.values.outcome import Outcome
 
-FIELDS = ["density_direct", "potential_field", "navigation_function", "cbf_qp"]
+FIELDS = [
+    "density_direct",
+    "density_moving",
+    "potential_field",
+    "navigation_function",
+    "cbf_qp",
+]
 PERIOD = 0.001
 
 

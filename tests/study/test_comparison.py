@@ -1,6 +1,7 @@
 """A comparison: the same starts for all, every run counted, failures recorded."""
 
 import json
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -15,11 +16,12 @@ from densarm.study.baselines import BASELINES, MAIN_PARAMETERS
 from densarm.study.comparison import (
     LIMIT_SHARE,
     MEASURES,
-    SCALES,
     Comparison,
     TimedController,
     compare,
+    scales,
 )
+from densarm.study.conditions import Condition
 from densarm.values.arrays import Array
 from densarm.values.outcome import RUN_ENDS, Outcome
 
@@ -35,12 +37,15 @@ def comparison(swing_up: Scenario) -> Comparison:
 def test_json_holds_counts_medians_and_runs(comparison: Comparison) -> None:
     data = json.loads(json.dumps(comparison.to_json(), allow_nan=False))
     assert list(data) == [
-        *("methods", "starts", "scenario", "seed", "tuning_starts", "limit_share"),
+        *("methods", "starts", "scenario", "seed", "tuning_starts", "budget", "limit_share"),
     ]
     assert (data["starts"], data["scenario"], data["seed"]) == (3, "swing_up", 4)
     assert [entry["method"] for entry in data["methods"]] == list(NAMES)
     for entry in data["methods"]:
-        assert list(entry) == ["method", "parameter", "scale", *RUN_ENDS, *MEASURES, "runs"]
+        told = ["method", "condition", "parameter", "scale", "value"]
+        assert list(entry) == [*told, *RUN_ENDS, *MEASURES, "runs"]
+        assert entry["condition"] == {"push": 0.0, "payload": 0.0, "moving": 0.0}
+        assert (entry["scale"], entry["value"]) == (1.0, 0.05)
         assert sum(entry[outcome] for outcome in RUN_ENDS) == len(entry["runs"]) == 3
         reached = [run["time_s"] for run in entry["runs"] if run["outcome"] == "reached"]
         assert entry["time_s"] == pytest.approx(np.median(reached))
@@ -106,7 +111,7 @@ def test_progress_names_baseline_and_start(swing_up: Scenario) -> None:
     told: list[str] = []
     short = replace(swing_up, simulation=replace(swing_up.simulation, time_limit=0.2))
     compare(short, ["potential_field"], 1, tuning_starts=1, on_progress=told.append)
-    tuning = ["potential_field from tuning start 1 of 1"] * len(SCALES)
+    tuning = ["potential_field from tuning start 1 of 1"] * len(scales(3))
     assert told == [*tuning, "potential_field from start 1 of 1"]
 
 
@@ -120,7 +125,7 @@ def runs_of_odd(monkeypatch: pytest.MonkeyPatch) -> Odd:
 
     def odd(scenario: Scenario, scale: float) -> Drive:
         seen.append((scenario.start.tolist(), scale, scenario))
-        if scale != SCALES[-1]:
+        if scale != scales(3)[-1]:
             raise InvalidValueError("gain", 0.0, "positive")
         return BASELINES["density_direct"](scenario)
 
@@ -133,10 +138,10 @@ def test_tuning_takes_the_scale_that_reaches_on_other_starts(
     swing_up: Scenario, runs_of_odd: Odd
 ) -> None:
     result = compare(swing_up, ["odd"], starts=2, seed=4, tuning_starts=1).baselines[0]
-    assert result.scale == SCALES[-1]
-    tuned, counted = runs_of_odd[: len(SCALES)], runs_of_odd[len(SCALES) :]
-    assert [scale for _, scale, _ in tuned] == list(SCALES)
-    assert [scale for _, scale, _ in counted] == [SCALES[-1]] * 2
+    assert result.scale == scales(3)[-1]
+    tuned, counted = runs_of_odd[: len(scales(3))], runs_of_odd[len(scales(3)) :]
+    assert [scale for _, scale, _ in tuned] == list(scales(3))
+    assert [scale for _, scale, _ in counted] == [scales(3)[-1]] * 2
     assert not any(start == tuned[0][0] for start, _, _ in counted)
 
 
@@ -144,6 +149,52 @@ def test_all_plan_with_the_same_share_of_the_limits(swing_up: Scenario, runs_of_
     compare(swing_up, ["odd"], starts=1, tuning_starts=0)
     scenario = runs_of_odd[0][2]
     assert {*vars(scenario.timing).values(), *vars(scenario.speed).values()} == {LIMIT_SHARE}
+
+
+@pytest.mark.slow
+def test_every_condition_is_tuned_on_and_met_by_every_method(
+    swing_up: Scenario, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    calls: list[tuple[str, float, tuple[str, ...], list[float]]] = []
+
+    def named(name: str) -> Callable[[Scenario, float], Drive]:
+        def drive(scenario: Scenario, scale: float) -> Drive:
+            obstacles = tuple(item.name for item in scenario.scene)
+            calls.append((name, scale, obstacles, scenario.start.tolist()))
+            return BASELINES["cbf_qp"](scenario, scale)
+
+        return drive
+
+    for name in NAMES:
+        monkeypatch.setitem(BASELINES, name, named(name))
+    simulation = replace(swing_up.simulation, time_limit=0.1)
+    conditions = [Condition(), Condition(push=1.0), Condition(moving=0.5)]
+    short = replace(swing_up, simulation=simulation)
+    found = compare(short, NAMES, 2, 4, 1, conditions=conditions, budget=2)
+    assert len(calls) == 2 * (2 * 3 * 1 + 3 * 2)
+    per_method = [[call[1:] for call in calls if call[0] == name] for name in NAMES]
+    assert per_method[0] == per_method[1]
+    tuned, counted = per_method[0][:6], per_method[0][6:]
+    assert [scale for scale, *_ in tuned] == [1.0] * 3 + [0.2] * 3
+    assert {start[0] for *_, start in tuned}.isdisjoint({start[0] for *_, start in counted})
+    assert found.conditions == tuple(conditions)
+    assert [len(found.under(condition)) for condition in conditions] == [2, 2, 2]
+    ours, theirs = found.rivals(Condition()) or (None, None)
+    assert (ours and ours.baseline, theirs and theirs.baseline) == NAMES
+
+
+def test_what_changes_obstacles_under_a_plan_is_told(swing_up: Scenario) -> None:
+    condition = Condition(moving=0.5)
+    found = compare(swing_up, NAMES[:1], 1, 4, 0, conditions=[condition]).baselines[0]
+    assert found.count("failed") == 1
+    assert "the obstacles have changed" in found.runs[0].detail
+
+
+def test_scales_go_out_from_the_default() -> None:
+    assert scales(1) == [1.0]
+    assert scales(3) == pytest.approx([1.0, 0.2, 5.0])
+    assert scales(5) == pytest.approx([1.0, 5**-0.5, 5**0.5, 0.2, 5.0])
+    assert [len(scales(budget)) for budget in range(1, 9)] == list(range(1, 9))
 
 
 def test_every_baseline_has_a_main_parameter() -> None:
@@ -159,6 +210,8 @@ def test_wrong_input(swing_up: Scenario) -> None:
         compare(swing_up, NAMES, starts=1, seed=-1)
     with pytest.raises(InvalidValueError, match="tuning_starts = -1"):
         compare(swing_up, NAMES, starts=1, tuning_starts=-1)
+    with pytest.raises(InvalidValueError, match="budget = 0"):
+        compare(swing_up, NAMES, starts=1, budget=0)
 
 
 class Echo:
