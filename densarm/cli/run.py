@@ -13,9 +13,9 @@ from densarm.cli.output import print_run, progress, write_json, write_pictures
 @click.argument("scenario")
 @click.option(
     "--guide",
-    type=click.Choice(["path", "direct"]),
-    help="Where sub-goals come from: a collision-free path, or none but the goal.  "
-    "[default: what the scenario says, else path]",
+    type=click.Choice(["auto", "density", "direct", "path"]),
+    help="What leads: the density, by via points where it is stuck, else a planner's path (auto); "
+    "the first two; the first alone; the last.  [default: what the scenario says, else auto]",
 )
 @number_option(
     "--seed", None, "Seed of the planner.  [default: what the scenario says, else 0]", least=0

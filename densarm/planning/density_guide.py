@@ -15,6 +15,9 @@ from densarm.planning.shortening import shortened
 from densarm.values.arrays import Array
 from densarm.world.swept_check import SweptCheck
 
+ALONE, BY_VIA_POINT = "the density alone", "the density by way of a via point"
+"""What `GuidePath.found_by` says of the two ways that `DensityGuide` finds."""
+
 _DRAWN = 100  # configurations at most until one is clear
 
 
@@ -88,33 +91,37 @@ class DensityGuide:
 
     def plan(self, start: Array, goal: Array, seed: int) -> GuidePath | NoPath:
         """Act as `Guide.plan`: return a chain of clear segments, or why there is none."""
-        rng = np.random.default_rng(seed)
-        alone = self._alone(start, goal)
-        if alone.reached:
-            return self._path(alone.q, rng, "the density alone")
-        stuck = self._legs.why_stuck(alone)
-        bounds = SamplingBounds(self._legs.check.arm, self._parameters, start, goal)
+        rng, parameters = np.random.default_rng(seed), self._parameters
+        arm = self._legs.check.arm
+        # From the narrow end first, from which it fails more often.
+        first, last = sorted((start, goal), key=self._room)
+        curve, found_by, stuck = self._legs.curve_from_either_end(_pair(first, last)), ALONE, ""
+        way = curve.q if curve.reached else None
+        if way is None:
+            stuck, found_by = self._legs.why_stuck(curve), BY_VIA_POINT
+            bounds = SamplingBounds(arm, parameters, start, goal)
+            way = self._by_via_point(first, last, bounds, rng)
+        if way is None:
+            tried = f"; from none of {parameters.vias} via points it leads to both ends"
+            return NoPath(stuck + (tried if parameters.vias else ""))
+        path = shortened(arm, self._freedom, way, parameters.shortcuts, rng)
+        path = path if first is start else path[::-1]
+        return GuidePath(path, is_clear=True, found_by=found_by, stuck=stuck)
+
+    def _room(self, q: Array) -> float:
+        return float(self._legs.check.distance_margin(q).min(initial=np.inf))
+
+    def _by_via_point(
+        self, first: Array, last: Array, bounds: SamplingBounds, rng: np.random.Generator
+    ) -> Array | None:
         for index in range(self._parameters.vias):
             via = self._via(bounds.everywhere if index % 2 else bounds.near, rng)
-            # From the narrow end first, which is where it fails more often.
-            from_goal = self._legs.curve(_pair(goal, via))
-            if from_goal.reached:
-                from_start = self._legs.curve(_pair(start, via))
-                if from_start.reached:
-                    way = np.vstack([from_start.q, from_goal.q[-2::-1]])
-                    found_by = "the density by way of a via point"
-                    return replace(self._path(way, rng, found_by), stuck=stuck)
-        tried = f"; from none of {self._parameters.vias} via points it leads to both ends"
-        return NoPath(stuck + (tried if self._parameters.vias else ""))
-
-    def _alone(self, start: Array, goal: Array) -> IntegralCurve:
-        """Return the curve between both ends, from the one with less room first."""
-        check = self._legs.check
-        room = [check.distance_margin(q).min(initial=np.inf) for q in (start, goal)]
-        if room[0] <= room[1]:
-            return self._legs.curve_from_either_end(_pair(start, goal))
-        curve = self._legs.curve_from_either_end(_pair(goal, start))
-        return replace(curve, q=curve.q[::-1]) if curve.reached else curve
+            leg = self._legs.curve(_pair(first, via))
+            if leg.reached:
+                other = self._legs.curve(_pair(last, via))
+                if other.reached:
+                    return np.vstack([leg.q, other.q[-2::-1]])
+        return None
 
     def _via(self, bounds: Bounds, rng: np.random.Generator) -> Array:
         check = self._legs.check
@@ -123,11 +130,6 @@ class DensityGuide:
             if check.configuration_is_clear(via):
                 break
         return via
-
-    def _path(self, way: Array, rng: np.random.Generator, found_by: str) -> GuidePath:
-        arm, tries = self._legs.check.arm, self._parameters.shortcuts
-        path = shortened(arm, self._freedom, way, tries, rng)
-        return GuidePath(path, is_clear=True, found_by=found_by)
 
 
 def _pair(start: Array, goal: Array) -> GuidePath:

@@ -14,7 +14,7 @@ from densarm.density.navigation_density import DensityParameters
 from densarm.density.sub_goals import GuidePath
 from densarm.density.unsafe_sets import SensingParameters
 from densarm.errors import InvalidValueError
-from densarm.planning.density_guide import DensityGuide, Legs
+from densarm.planning.density_guide import ALONE, DensityGuide, Legs
 from densarm.planning.guide import Guide, NoPath, PlanningParameters
 from densarm.planning.motion import Motion, PlanningError, TimingParameters
 from densarm.planning.path_guide import PathGuide
@@ -189,7 +189,7 @@ def _planned(
     if guide == "direct":
         # Not claimed to be clear: the density bends around what blocks it, or gets stuck there.
         ends = np.stack([depart, arrive])
-        path = GuidePath(ends, is_clear=False, found_by="the density alone")
+        path = GuidePath(ends, is_clear=False, found_by=ALONE)
         return PlannedPath(path, kept, 0.0)
     began = time.perf_counter()
     answer: GuidePath | NoPath

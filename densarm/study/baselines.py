@@ -52,7 +52,7 @@ class Baseline(Protocol):
 
 def density(scenario: Scenario, scale: float = 1.0) -> Drive:
     """Track the planning system's curve along a collision-free path by the density controller."""
-    return _by_density(scenario, scale, ControlForm.TRACKING, "path")
+    return _by_density(scenario, scale, ControlForm.TRACKING, "auto")
 
 
 def density_direct(scenario: Scenario, scale: float = 1.0) -> Drive:

@@ -108,7 +108,7 @@ def test_guides_to_choose_from_are_those_that_exist() -> None:
         (["run"], "Missing argument 'SCENARIO'"),
         (["run", "swing_up", "extra"], "extra"),
         (["run", "swing_up", "--frob"], "--frob"),
-        (["run", "swing_up", "--guide", "sideways"], "'sideways' is not one of 'path', 'direct'"),
+        (["run", "swing_up", "--guide", "sideways"], "'sideways' is not one of 'auto', 'density',"),
         (["run", "swing_up", "--seed", "-1"], "--seed"),
         (["run", "swing_up", "--seed", "a"], "--seed"),
         (["bench"], "Missing command"),

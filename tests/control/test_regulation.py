@@ -124,7 +124,7 @@ def test_a_path_leads_where_the_goal_alone_does_not(
     for path in (None, swing_up_motion.path):
         controller = DensityRegulation(swing_up.world, swing_up.goal, path=path, plain=plain)
         np.testing.assert_array_equal(controller.goal, swing_up.goal)
-        ends.append(goes_to(controller, arm, swing_up.start))
+        ends.append(goes_to(controller, arm, swing_up.start, steps=1000))
     off, near = (np.abs(arm.difference(swing_up.goal, end)).max() for end in ends)
     assert off > 1.5 > 0.5 > near
 

@@ -293,7 +293,7 @@ def test_task_of_a_run_tells_guide_and_seed(swing_up: Scenario) -> None:
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        ({"guide": "astar"}, "^guide = 'astar': must be one of direct, path"),
+        ({"guide": "astar"}, "^guide = 'astar': must be one of auto, density, direct, path"),
         ({"seed": -1}, "^seed = -1"),
         ({"seed": 0.5}, "^seed = 0.5"),
     ],

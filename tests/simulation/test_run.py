@@ -294,6 +294,7 @@ def test_summary(swing_up_run: Run) -> None:
         "min_clearance_m",
         "goal_error_rad",
         "peak_torque_ratio",
+        "led_by",
         "plan_time_s",
         "preparation_time_s",
         "certified",
