@@ -123,7 +123,8 @@ def plan_motion(
     points, kept, stuck, remark = planned.path.waypoints, planned.kept, "", ""
     if not planned.path.is_clear:
         curve = legs.curve_from_either_end(planned.path)
-        space, rng = SeparatingPlanes(world, margin, kept), np.random.default_rng(seed)
+        # No more than the density would: where nothing is sensed it leads straight.
+        space, rng = SeparatingPlanes(world, margin, sensing.distance), np.random.default_rng(seed)
         points = shortened(world.arm, space, curve.q, search.shortcuts, rng)
         kept, stuck, remark = _kept_along(check, points, kept), legs.why_stuck(curve), curve.remark
     points, kept = np.vstack([start, points]), _SMOOTH_SHARE * kept

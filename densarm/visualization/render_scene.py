@@ -35,7 +35,7 @@ class SummaryLine:
     words: tuple[tuple[str, bool | None], ...]
     """Outcome, duration, smallest clearance and certificate: each good, bad or neither."""
     detail: str
-    """What the outcome means, and what stood in the way; where it reached, its remark."""
+    """What the outcome means, and what stood in the way; where it reached, what led it."""
 
     @classmethod
     def of(cls, run: Run) -> "SummaryLine":
@@ -49,7 +49,8 @@ class SummaryLine:
             (f"smallest clearance {clearance}", None),
             ("certified" if run.certified else "not certified", run.certified),
         )
-        detail = run.remark if is_reached else f"{run.outcome.description} {run.detail}".strip()
+        told = "; ".join(filter(None, [run.led_by and f"Led by {run.led_by}", run.remark]))
+        detail = told if is_reached else f"{run.outcome.description} {run.detail}".strip()
         return cls(run.task.title, words, detail)
 
 
