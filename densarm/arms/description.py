@@ -44,14 +44,17 @@ class RobotDescription:
     postures: Mapping[str, Vector] = field(default_factory=dict)
     """Named joint positions, one number per joint [rad or m]."""
     shapes: str = "hull"
-    """What distances are measured to: each "hull", or the smallest "capsule" around it."""
+    """What distances are measured to: each "hull", "pieces" of it, or a "capsule" around it.
+
+    With hulls, pieces stand in where two links' hulls overlap and their meshes do not.
+    """
     collision_from_visual: str = "missing"
     """Which links collide as drawn: "never", those "missing" collision geometry, or "always"."""
     attachments: Sequence[Attachment] = ()
     """Bodies that the arm holds."""
 
     def __post_init__(self) -> None:
-        one_of("shapes", self.shapes, ["hull", "capsule"])
+        one_of("shapes", self.shapes, ["hull", "pieces", "capsule"])
         drawn = ["never", "missing", "always"]
         one_of("collision_from_visual", self.collision_from_visual, drawn)
         for key in ("package_dirs", "base_placement", "acceleration", "attachments"):

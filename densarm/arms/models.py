@@ -13,6 +13,7 @@ import pinocchio as pin
 from densarm.arms.collision_shapes import differentiable_geometry, evenly_filled
 from densarm.arms.description import RobotDescription, parse_robot_xml
 from densarm.arms.joints import lock_joints
+from densarm.arms.link_pieces import CutGeometry, cut_into_pieces
 from densarm.arms.self_collision import (
     ExcludedPair,
     add_self_collision_pairs,
@@ -37,6 +38,8 @@ class RobotModels(NamedTuple):
     collision: pin.GeometryModel
     excluded_pairs: tuple[ExcludedPair, ...]
     """The pairs of shapes that it leaves out."""
+    self_pieces: frozenset[str]
+    """Names of the shapes that are in self-collision pairs alone."""
     mesh_files: dict[str, Path]
     """The collision meshes that were read, by their path from the folder that holds them all."""
     links_without_collision: tuple[str, ...]
@@ -71,18 +74,30 @@ def build_models(description: RobotDescription) -> RobotModels:
                 "can be computed: add shapes or meshes to its links"
             )
         files = _mesh_files(collision)
-        collision = differentiable_geometry(model, collision, description.shapes)
+        drawn = collision
+        collision = differentiable_geometry(model, drawn, description.shapes)
     except RobotDescriptionError as error:
         raise _with_advice(error, urdf.links_without_collision) from None
     excluded = add_self_collision_pairs(model, collision, description.srdf)
     excluded += remove_always_colliding_pairs(model, collision)
-    _attach(model, collision, description.attachments)
+    cut = CutGeometry(collision, excluded, frozenset())
+    if description.shapes != "capsule":
+        everywhere = description.shapes == "pieces"
+        cut = cut_into_pieces(model, collision, drawn, excluded, everywhere=everywhere)
+    collision = cut.geometry
+    _attach(model, collision, description.attachments, cut.self_pieces)
     for attachment in description.attachments:
         if attachment.mass > 0.0:
             items = _attached_shapes(model, attachment)
             inertia = evenly_filled(items, attachment.mass)
             model.appendBodyToJoint(items[0].parentJoint, inertia, pin.SE3.Identity())
-    return RobotModels(model, collision, excluded, files, urdf.links_without_collision)
+    without_collision = urdf.links_without_collision
+    return RobotModels(model, *cut, files, without_collision)
+
+
+def build_collision_meshes(description: RobotDescription) -> pin.GeometryModel:
+    """Build Pinocchio's collision geometry as the URDF has it, which an arm's shapes enclose."""
+    return _placed_models(description, Urdf(description), pin.GeometryType.COLLISION)[1]
 
 
 def build_visual_model(description: RobotDescription) -> pin.GeometryModel:
@@ -214,7 +229,10 @@ def _require_inertia(model: pin.Model) -> None:
 
 
 def _attach(
-    model: pin.Model, geometry: pin.GeometryModel, attachments: Iterable[Attachment]
+    model: pin.Model,
+    geometry: pin.GeometryModel,
+    attachments: Iterable[Attachment],
+    self_pieces: frozenset[str] = frozenset(),
 ) -> None:
     """Add the shapes of held bodies; each pairs with what moves against it and it may not touch."""
     held = [(body, item) for body in attachments for item in _attached_shapes(model, body)]
@@ -226,11 +244,12 @@ def _attach(
         geometry.addGeometryObject(item)
     links = [model.frames[item.parentFrame].name for item in geometry.geometryObjects]
     joints = [item.parentJoint for item in geometry.geometryObjects]
+    whole = [k for k, o in enumerate(geometry.geometryObjects) if o.name not in self_pieces]
     for attachment, item in held:
         for link in attachment.touch_links:
             _frame(model, link, attachment)
         index = geometry.getGeometryId(item.name)
-        for other in range(geometry.ngeoms):
+        for other in whole:
             if joints[other] != item.parentJoint and links[other] not in attachment.touch_links:
                 # Pinocchio refuses the pair that two attached bodies both ask for.
                 pair = pin.CollisionPair(min(index, other), max(index, other))

@@ -93,6 +93,13 @@ class Mesh(Obstacle):
             raise InvalidValueError(name, pieces, "corners x y z of pieces with a volume") from None
 
 
+def indexed_triangles(mesh: coal.BVHModelBase) -> tuple[Array, NDArray[np.int64]]:
+    """Return vertices (V, 3) [m] and the indices of the three of each triangle (N, 3)."""
+    corners = map(mesh.tri_indices, range(mesh.num_tris))
+    triangles = np.array([[corner[i] for i in range(3)] for corner in corners], dtype=np.int64)
+    return np.array(mesh.vertices()), triangles
+
+
 Pieces = tuple[tuple[tuple[float, ...], ...], ...]
 
 
@@ -128,8 +135,7 @@ def _read(path: Path, scale: tuple[float, ...]) -> coal.BVHModelBase:
 
 
 def _enclosing_pieces(mesh: coal.BVHModelBase) -> Pieces:
-    vertices, corners = np.array(mesh.vertices()), map(mesh.tri_indices, range(mesh.num_tris))
-    triangles = np.array([[corner[i] for i in range(3)] for corner in corners], dtype=np.int64)
+    vertices, triangles = indexed_triangles(mesh)
     if not _is_closed(triangles):
         reason = "the mesh is not closed, or its faces point in and out: mend it, or use 'hull'"
         raise DensarmError(reason)
