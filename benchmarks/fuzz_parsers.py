@@ -1,9 +1,10 @@
 """Feed densarm's parsers broken files: a result, or a DensarmError of one line, and nothing else.
 
-Scenario TOML, run .npz, MotionBenchMaker problems, URDF, SRDF, MoveIt .scene and YAML are mutated
-from real files and from nested random values by hypothesis. A failure is any other exception, a
-message of several lines, a warning or output, an example that takes too long or kills the process,
-a file written or left, a pickle, another process, or more than 1 GB of memory.
+Scenario TOML, run .npz, MotionBenchMaker problems, URDF, SRDF, MoveIt .scene and YAML, and meshes
+in DAE and STL, are mutated from real files and from nested random values by hypothesis. A failure
+is any other exception, a message of several lines, a warning or output, an example that takes too
+long or kills the process, a file written or left, a pickle, another process, or more than 1 GB of
+memory.
 
     python benchmarks/fuzz_parsers.py --minutes 5 --json fuzz_parsers.json
 """

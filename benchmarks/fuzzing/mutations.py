@@ -25,6 +25,9 @@ VALUES = st.recursive(
 )
 DEPTHS = (10, 900, 20_000)
 
+# Else ElementTree writes prefixes, and no reader of Collada finds a mesh.
+ElementTree.register_namespace("", "http://www.collada.org/2005/11/COLLADASchema")
+
 Draw = Callable[[Any], Any]
 """Hypothesis' draw from a strategy."""
 
@@ -126,7 +129,9 @@ def mutated_xml(content: bytes, random: Random) -> bytes:
     text = ElementTree.tostring(root)
     if random.random() < 0.02:
         depth = random.choice(DEPTHS)
-        text = text.replace(b"</robot>", b"<a>" * depth + b"</a>" * depth + b"</robot>")
+        tag = random.choice((b"a", b"node"))
+        inside, end = b"<%s>" % tag * depth + b"</%s>" % tag * depth, text.rfind(b"</")
+        text = text[:end] + inside + text[end:]
     return text
 
 

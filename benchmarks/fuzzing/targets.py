@@ -79,6 +79,13 @@ world:
   octomap: {header: {frame_id: ''}, octomap: {data: []}}
 """
 POSE = {"position": [1.0, 0.1, 0.5], "orientation_xyzw": [0.0, 0.0, 0.0, 1.0]}
+CORNERS = [f"vertex {corner}\n" for corner in ("0 0 0", "1 0 0", "0 1 0", "0 0 1")]
+LOOPS = ["".join(CORNERS[:k] + CORNERS[k + 1 :]) for k in range(4)]
+FACETS = [f"facet normal 0 0 0\nouter loop\n{loop}endloop\nendfacet\n" for loop in LOOPS]
+STL = f"solid it\n{''.join(FACETS)}endsolid it\n"
+NODES = b"""<node><matrix>0 -1 0 5 1 0 0 0 0 0 2 7 0 0 0 1</matrix>
+<node><translate>1 0 0</translate><rotate>0 0 1 90</rotate><scale>2 1 1</scale>
+<instance_geometry url="#wedge"/></node>"""
 PROBLEMS = {
     "metadata": {"robot": "panda", "joints": ["a", "b"], "locked_joints": {"finger": 0.065}},
     "problems": [
@@ -130,6 +137,14 @@ def _xml(content: bytes, random: Random, _: Draw) -> bytes:
     return mutations.mutated_xml(content, random)
 
 
+def _yaml(text: str) -> Any:
+    return next(iter(yaml.safe_load_all(text)))
+
+
+def _mesh(path: Path) -> densarm.Mesh:
+    return densarm.Mesh(name="it", path=path)
+
+
 def _with_srdf(path: Path) -> Arm:
     return densarm.load_arm(DATA / "branching.urdf", srdf=path)
 
@@ -150,6 +165,8 @@ def targets(folder: Path) -> dict[str, Target]:
     shutil.copytree(DATA / "meshes", folder / "meshes")
     robot = (robots_folder() / "two_link" / "robot.urdf").read_bytes()
     tree = (DATA / "branching.urdf").read_bytes()
+    in_centimetres = tree.replace(b"wedge.stl", b"wedge_cm.dae")
+    collada, stl = ((DATA / "meshes" / name).read_bytes() for name in ("wedge_cm.dae", "wedge.stl"))
     scenarios = tuple(path.read_bytes() for path in scenario_paths().values())
     problems = json.dumps(PROBLEMS).encode()
     return {
@@ -160,16 +177,18 @@ def targets(folder: Path) -> dict[str, Target]:
         "problems": Target(
             ".json", densarm.load_problems, (problems,), _structured(json.loads, mutations.dumped)
         ),
-        "urdf": Target(".urdf", densarm.load_arm, (robot, tree), _xml),
+        "urdf": Target(".urdf", densarm.load_arm, (robot, tree, in_centimetres), _xml),
         "srdf": Target(".srdf", _with_srdf, ((DATA / "branching.srdf").read_bytes(),), _xml),
         "scene": Target(".scene", densarm.load_scene, (SCENE.encode(),), _text),
         "yaml": Target(
             ".yaml",
             densarm.load_scene,
-            (PLANNING_SCENE.encode(),),
-            _structured(yaml.safe_load, mutations.dumped),
+            (PLANNING_SCENE.encode(), f"---{PLANNING_SCENE}---\n".encode()),
+            _structured(_yaml, lambda value: f"{mutations.dumped(value)}\n---\n"),
         ),
+        "dae": Target(".dae", _mesh, (collada, collada.replace(b"<node>", NODES)), _xml),
+        "stl": Target(".stl", _mesh, (STL.encode(), STL.upper().encode(), stl), _text),
     }
 
 
-NAMES = ("scenario", "run", "problems", "urdf", "srdf", "scene", "yaml")
+NAMES = ("scenario", "run", "problems", "urdf", "srdf", "scene", "yaml", "dae", "stl")

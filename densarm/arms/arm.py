@@ -22,7 +22,7 @@ from densarm.arms.joints import (
 )
 from densarm.arms.models import build_models, build_visual_model, end_effector_frame
 from densarm.arms.self_collision import ExcludedPair, srdf_postures
-from densarm.errors import InvalidValueError
+from densarm.errors import InvalidValueError, RobotDescriptionError
 from densarm.scene.scene import Attachment
 from densarm.values.arrays import Array
 from densarm.values.checks import finite_vector
@@ -51,6 +51,11 @@ class Arm:
         models = build_models(description)
         self.model, self.collision_model = models.model, models.collision
         self._mesh_files = models.mesh_files
+        self.origin: Array = models.origin
+        """Point of the world that is the origin of the models (3,) [m].
+
+        It is the world's own, or the first joint's place if that is more than 10 m away from it.
+        """
         self.excluded_pairs: tuple[ExcludedPair, ...] = models.excluded_pairs
         """Shapes that are not checked against each other though they move so, and why."""
         self.self_pieces: frozenset[str] = models.self_pieces
@@ -63,6 +68,14 @@ class Arm:
 
         They collide as drawn, or not at all if `collision_from_visual` is "never".
         """
+        self.remarks: tuple[str, ...] = models.remarks
+        """What was taken otherwise than URDF and SRDF have it, one phrase each.
+
+        Collision shapes without any size are left out, flat ones made 1 mm thick, and pairs of
+        links that the URDF lacks ignored.
+        """
+        self.links_without_mass: tuple[str, ...] = models.links_without_mass
+        """Links that joints move without any mass, if M is singular: nothing tells torques then."""
         self.data = self.model.createData()
         self.nq: int = self.model.nq
         self.nv: int = self.model.nv
@@ -73,7 +86,9 @@ class Arm:
         self.joint_index: NDArray[np.int64] = np.array([self.idx_q, self.continuous], np.int64)
         """First index of each joint in a configuration, and 1 where it is continuous (2, nv)."""
         self._continuous: list[int] = np.flatnonzero(self.continuous).tolist()
-        self.limits: JointLimits = joint_limits(self.model, description.acceleration)
+        self.limits: JointLimits = joint_limits(
+            self.model, description.acceleration, has_masses=not self.links_without_mass
+        )
         self.end_effector_frame = end_effector_frame(self.model, description.end_effector)
         self.end_effector: str = self.model.frames[self.end_effector_frame].name
         self.postures: dict[str, Array] = self._postures()
@@ -189,6 +204,26 @@ class Arm:
         """
         return self.configurations(self.angles(q) + step)
 
+    def require_masses(self, what: str) -> None:
+        """Refuse an arm without the masses that something needs.
+
+        Args:
+            what: needs them, as an error begins.
+
+        Raises:
+            RobotDescriptionError: `links_without_mass`, how to give them one, or do without.
+        """
+        if not self.links_without_mass:
+            return
+        mend = "load the arm with inertia = 'from_shapes'"
+        if self.description.inertia == "from_shapes":
+            mend = "or a collision shape to compute one from"
+        raise RobotDescriptionError(
+            f"robot {self.name!r}: {what} needs masses, and there is none of link "
+            f"{', '.join(map(repr, self.links_without_mass))}: give an <inertial>, {mend}, or "
+            "command velocities (control.form = 'velocity', in Python plant=SingleIntegrator(arm))"
+        )
+
     def mass_matrix(self, q: ArrayLike) -> Array:
         """Return the joint-space inertia matrix M(q).
 
@@ -197,7 +232,11 @@ class Arm:
 
         Returns:
             M (nv, nv), symmetric [kg·m² for revolute joints].
+
+        Raises:
+            RobotDescriptionError: the arm has `links_without_mass`.
         """
+        self.require_masses("the mass matrix")
         q = self.check_configuration("configuration", q)
         upper = np.triu(pin.crba(self.model, self.data, q))
         return np.asarray(upper + np.triu(upper, 1).T)
@@ -211,7 +250,11 @@ class Arm:
 
         Returns:
             H (nv,) [N·m or N], so that M(q) a + H(q, v) = tau.
+
+        Raises:
+            RobotDescriptionError: the arm has `links_without_mass`.
         """
+        self.require_masses("torque")
         q = self.check_configuration("configuration", q)
         v = finite_vector("velocity", v, self.nv)
         return np.array(pin.nonLinearEffects(self.model, self.data, q, v))
@@ -244,10 +287,13 @@ def load_arm(
     base_placement: pin.SE3 | None = None,
     shapes: str = "hull",
     collision_from_visual: str | None = None,
+    inertia: str | None = None,
+    density: float | None = None,
 ) -> Arm:
     """Load an arm by name or from a URDF file.
 
-    Joints that mimic locked ones are locked with them.
+    Joints that mimic locked ones are locked with them. `Arm.remarks` tells what of the files was
+    not taken as it stands.
 
     Args:
         robot: a known name (``densarm list``), or the path of a URDF.
@@ -269,11 +315,17 @@ def load_arm(
         collision_from_visual: which links collide as they are drawn: "missing" for those without
             collision geometry, "always" for all that are drawn, or "never"; None for "missing",
             unless a known robot needs another. `Arm.links_without_collision` names those concerned.
+        inertia: "from_shapes" gives links without an <inertial>, or with one of zeros, that of
+            their collision shapes, of one density; "given" leaves them massless. None for "given",
+            unless a known robot needs another. An arm with `Arm.links_without_mass` is planned for
+            and moved by velocities only.
+        density: of masses from shapes [kg/m³]; None for 1000, or a known robot's own.
 
     Raises:
-        UnknownNameError: no such robot, joint to move, lock or cut at, or link of the SRDF.
+        UnknownNameError: no such robot, or joint to move, lock or cut at.
         InvalidValueError: a locked position or base placement that is not finite, a locked joint
-            that shall be in the arm, or shapes or links to collide as drawn of another name.
+            that shall be in the arm, shapes, links to collide as drawn or an inertia of another
+            name, or a density that is not positive or not read.
         FileContentError: a file that cannot be read.
         RobotDescriptionError: a URDF or SRDF that cannot be used.
     """
@@ -289,8 +341,12 @@ def load_arm(
         if not isinstance(base_placement, pin.SE3):
             raise InvalidValueError("base_placement", base_placement, "a pinocchio.SE3")
         changes["base_placement"] = pin.SE3ToXYZQUAT(base_placement).tolist()
-    if collision_from_visual is not None:
-        changes["collision_from_visual"] = collision_from_visual
+    chosen = {
+        "collision_from_visual": collision_from_visual,
+        "inertia": inertia,
+        "density": density,
+    }
+    changes |= {key: value for key, value in chosen.items() if value is not None}
     description = replace(description, **changes)
     if cut := _listed(cut_joints):
         description = without_subtrees(description, cut)

@@ -10,7 +10,13 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from densarm.errors import RobotDescriptionError
-from densarm.scene.shapes import FARTHEST, box_hull, circumscribed_cylinder, convex_hull
+from densarm.scene.shapes import (
+    FARTHEST,
+    LARGEST,
+    box_hull,
+    circumscribed_cylinder,
+    convex_hull,
+)
 from densarm.values.arrays import Array
 
 # [m], agreement of a cylinder's ends with the spheres on them: URDFs write 1.57 for a right angle.
@@ -18,6 +24,9 @@ _CAPSULE_TOLERANCE = 1e-4
 
 # Per size of the body: by which the solver may miss a point, and the capsule exceeds the farthest.
 _TIGHTNESS = 1e-6
+
+_THICKNESS = 1e-3  # [m] of what has none
+_NOTHING = 1e-6  # per longest side, below which a body has no hull
 
 _ROUNDS = 100
 _SMALL = 1e-12  # keeps quotients of zero by zero at zero
@@ -48,16 +57,56 @@ def differentiable_geometry(
     return result
 
 
+def thicken_flat_shapes(model: pin.Model, geometry: pin.GeometryModel) -> tuple[str, ...]:
+    """Give shapes without thickness, stickers say, 1 mm of it, and return what was done.
+
+    A distance has no gradient inside of what has no inside. Each encloses what it stands for.
+    """
+    remarks = []
+    for item in geometry.geometryObjects:
+        link, shape = model.frames[item.parentFrame].name, item.geometry
+        thick = _thickened(shape, f"collision mesh {item.name!r} of link {link!r}")
+        if thick is not shape:
+            item.geometry = thick
+            remarks.append(f"collision geometry {item.name!r} of link {link!r} is flat: 1 mm thick")
+    return tuple(remarks)
+
+
+def filled_links(
+    model: pin.Model, geometry: pin.GeometryModel, density: float
+) -> dict[int, pin.Inertia]:
+    """Return the inertia of each link's shapes in its joint's frame, by the link's frame.
+
+    Shapes are those that a URDF gives, meshes filled to their hull, of a density [kg/m³].
+    """
+    by_link: dict[int, list[pin.GeometryObject]] = {}
+    for item in geometry.geometryObjects:
+        by_link.setdefault(item.parentFrame, []).append(item)
+    filled = {}
+    for frame, items in by_link.items():
+        solid = _merge_capsules(items)
+        for item in solid:
+            if isinstance(item.geometry, coal.BVHModelBase):
+                item.geometry = _differentiable_shape(item, model.frames[frame].name)
+        filled[frame] = _filled(solid, density)
+    return filled
+
+
 def evenly_filled(items: Iterable[pin.GeometryObject], mass: float) -> pin.Inertia:
     """Return the inertia of a mass [kg] that is spread evenly over the volume of shapes."""
+    total = _filled(items, 1.0)
+    return pin.Inertia(mass, total.lever, mass / total.mass * total.inertia)
+
+
+def _filled(items: Iterable[pin.GeometryObject], density: float) -> pin.Inertia:
     total = pin.Inertia.Zero()
     for item in items:
         shape = item.geometry
         turning = np.array(shape.computeMomentofInertiaRelatedToCOM())
-        symmetric = 0.5 * (turning + turning.T)
-        solid = pin.Inertia(shape.computeVolume(), np.array(shape.computeCOM()), symmetric)
-        total += item.placement.act(solid)
-    return pin.Inertia(mass, total.lever, mass / total.mass * total.inertia)
+        symmetric = 0.5 * density * (turning + turning.T)
+        mass = density * shape.computeVolume()
+        total += item.placement.act(pin.Inertia(mass, np.array(shape.computeCOM()), symmetric))
+    return total
 
 
 class FittedCapsule(NamedTuple):
@@ -107,12 +156,39 @@ def _require_usual_size(item: pin.GeometryObject, link: str) -> None:
     sizes = [getattr(shape, key) for key in keys if hasattr(shape, key)]
     numbers = np.hstack([*sizes, item.placement.translation])
     reason = "a size that is not positive" if not (numbers[:-3] > 0.0).all() else ""
-    if not (np.abs(numbers) < FARTHEST).all():
-        reason = "a size or position that is not finite, or beyond 1000 km"
+    if not (np.abs(numbers[:-3]) <= LARGEST).all():
+        reason = "a size that is not finite, or above 1 km"
+    if not (np.abs(item.placement.translation) < FARTHEST).all():
+        reason = "a position that is not finite, or beyond 1000 km"
     if reason:
         raise RobotDescriptionError(
             f"collision geometry {item.name!r} of link {link!r} has {reason}"
         )
+
+
+def _thickened(shape: coal.CollisionGeometry, name: str) -> coal.CollisionGeometry:
+    """Return a shape, or where it has no thickness one that encloses it and has."""
+    if isinstance(shape, coal.Box):
+        sides = _at_least_thin(2.0 * shape.halfSide)
+        return shape if (sides == 2.0 * shape.halfSide).all() else coal.Box(sides)
+    if isinstance(shape, coal.Cylinder | coal.Capsule):
+        radius, length = shape.radius, 2.0 * shape.halfLength
+        sides = _at_least_thin(np.array([2.0 * radius, length]))
+        same = (sides == [2.0 * radius, length]).all()
+        return shape if same else type(shape)(0.5 * sides[0], sides[1])
+    if isinstance(shape, coal.BVHModelBase):
+        vertices = np.array(shape.vertices())
+        try:
+            convex_hull(vertices, name)
+        except RobotDescriptionError:
+            cube = list(product((-0.5 * _THICKNESS, 0.5 * _THICKNESS), repeat=3))
+            return convex_hull((vertices[:, np.newaxis] + cube).reshape(-1, 3), name)
+    return shape
+
+
+def _at_least_thin(sides: Array) -> Array:
+    """Return sides [m], those that are as nothing beside the longest 1 mm long."""
+    return np.where((sides >= 0.0) & (sides <= _NOTHING * sides.max()), _THICKNESS, sides)
 
 
 def _differentiable_shape(item: pin.GeometryObject, link: str) -> coal.CollisionGeometry:

@@ -6,11 +6,12 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
+from xml.parsers import expat
 
-from densarm.errors import DensarmError, RobotDescriptionError
+from densarm.errors import DensarmError, InvalidValueError, RobotDescriptionError
 from densarm.scene.scene import Attachment
 from densarm.values.arrays import Vector
-from densarm.values.checks import one_of
+from densarm.values.checks import one_of, positive
 
 DATA_WHEEL = "example-robot-data"
 """Prefix ``example-robot-data:`` of a path inside that wheel's folder of robots."""
@@ -23,7 +24,8 @@ class RobotDescription:
     Holding text, not paths, lets a recorded run rebuild its own arm. Sequences are kept as tuples.
 
     Raises:
-        InvalidValueError: shapes of another name, or links of another name to collide as drawn.
+        InvalidValueError: shapes, links to collide as drawn or an inertia of another name, or a
+            density that is not positive or not read.
     """
 
     name: str
@@ -50,6 +52,10 @@ class RobotDescription:
     """
     collision_from_visual: str = "missing"
     """Which links collide as drawn: "never", those "missing" collision geometry, or "always"."""
+    inertia: str = "given"
+    """Masses of links that have none: as "given", or "from_shapes", of a density."""
+    density: float | None = None
+    """Of masses from shapes [kg/m³]; None for 1000."""
     attachments: Sequence[Attachment] = ()
     """Bodies that the arm holds."""
 
@@ -57,6 +63,11 @@ class RobotDescription:
         one_of("shapes", self.shapes, ["hull", "pieces", "capsule"])
         drawn = ["never", "missing", "always"]
         one_of("collision_from_visual", self.collision_from_visual, drawn)
+        one_of("inertia", self.inertia, ["given", "from_shapes"])
+        if self.density is not None and self.inertia == "given":
+            raise InvalidValueError("density", self.density, "with inertia = 'from_shapes' only")
+        if self.density is not None:
+            positive("density", self.density)
         for key in ("package_dirs", "base_placement", "acceleration", "attachments"):
             object.__setattr__(self, key, _frozen(getattr(self, key)))
         postures = {name: _frozen(angles) for name, angles in self.postures.items()}
@@ -112,10 +123,17 @@ def resolve_path(path: str, beside: Path) -> Path:
 
 
 def parse_robot_xml(text: str, kind: str) -> ElementTree.Element:
-    """Return the root ``<robot>`` of a text, whose kind is "URDF" or "SRDF" for errors."""
+    """Return the root ``<robot>`` of a text, whose kind is "URDF" or "SRDF" for errors.
+
+    Prefixes are parts of names and need not be declared: simulators' tags as a rule are not.
+    """
+    builder, parser = ElementTree.TreeBuilder(), expat.ParserCreate()
+    parser.StartElementHandler, parser.EndElementHandler = builder.start, builder.end
+    parser.CharacterDataHandler = builder.data
     try:
-        root = ElementTree.fromstring(text)
-    except ElementTree.ParseError as error:
+        parser.Parse(text, True)
+        root = builder.close()
+    except (expat.ExpatError, ValueError) as error:
         raise RobotDescriptionError(f"{kind}: not well-formed XML ({error})") from None
     if root.tag != "robot":
         raise RobotDescriptionError(f"{kind}: the root element is <{root.tag}>, not <robot>")

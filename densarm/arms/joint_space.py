@@ -4,6 +4,7 @@ import math
 from typing import Protocol
 
 import numpy as np
+import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 
 from densarm.values.arrays import Array
@@ -56,6 +57,21 @@ class EuclideanSpace:
     def integrate(self, q: Array, step: Array) -> Array:
         """Return q + step, both (..., n) [m]."""
         return q + step
+
+
+def joint_axis(model: pin.Model, joint: int) -> tuple[Array, bool]:
+    """Return the unit vector (3,) along which a joint slides or about which it turns; if it slides.
+
+    The joints of the model have one degree of freedom each.
+    """
+    subspace = model.joints[joint].createData().S.reshape(6)
+    slides = not subspace[3:].any()
+    return (subspace[:3] if slides else subspace[3:]), slides
+
+
+def sliding_joints(model: pin.Model) -> NDArray[np.bool_]:
+    """Return which joints are prismatic (nv,), of a model of one degree of freedom a joint."""
+    return np.array([joint_axis(model, joint)[1] for joint in range(1, model.njoints)])
 
 
 @compiled_part

@@ -9,13 +9,17 @@ import numpy as np
 import pinocchio as pin
 
 from densarm.arms.description import RobotDescription, parse_robot_xml
-from densarm.arms.urdf import Urdf
+from densarm.arms.self_collision import PAIR_ENTRIES
+from densarm.arms.urdf import Urdf, end_link
 from densarm.errors import InvalidValueError, RobotDescriptionError, UnknownNameError
 from densarm.values.arrays import Array, Vector
 from densarm.values.checks import finite_tuple, finite_vector, positive
 
 DEFAULT_ACCELERATION = 10.0
 """Acceleration limit where nothing is known [rad/s² or m/s²]; a URDF carries none."""
+
+POSITION_TOLERANCE = 1e-9
+"""By which a position, computed or rounded to digits, may exceed its limits [rad or m]."""
 
 _UNLIMITED = 1e12  # URDFs write huge numbers where a joint has no limit
 _LINK_MARK = " (link)"
@@ -34,11 +38,20 @@ class JointLimits:
     acceleration: Array
     """Acceleration limit [rad/s² or m/s²]."""
     effort: Array
-    """Torque or force limit [N·m or N]; infinite as the velocity limit."""
+    """Torque or force limit [N·m or N]; infinite as the velocity limit, and without masses."""
+
+    def excess(self, angles: Array) -> Array:
+        """Return how far joint positions (..., nv) are outside their limits [rad or m], or < 0."""
+        return np.maximum(self.lower - angles, angles - self.upper)
 
 
-def joint_limits(model: pin.Model, acceleration: Vector | None) -> JointLimits:
-    """Return the limits of an arm's joints; None for the default acceleration on every joint."""
+def joint_limits(
+    model: pin.Model, acceleration: Vector | None, *, has_masses: bool = True
+) -> JointLimits:
+    """Return the limits of an arm's joints; None for the default acceleration on every joint.
+
+    Without masses nothing tells what torque a motion takes, so that no torque is limited.
+    """
     if acceleration is None:
         acceleration = (DEFAULT_ACCELERATION,) * model.nv
     given = finite_vector("acceleration", acceleration, model.nv)
@@ -52,7 +65,7 @@ def joint_limits(model: pin.Model, acceleration: Vector | None) -> JointLimits:
         upper=np.where(continuous | (upper >= _UNLIMITED), np.inf, upper),
         velocity=_limit_or_infinity(model.upperVelocityLimit),
         acceleration=given,
-        effort=_limit_or_infinity(model.upperEffortLimit),
+        effort=_limit_or_infinity(has_masses * model.upperEffortLimit),
     )
 
 
@@ -74,12 +87,14 @@ def only_joints(
     """
     urdf = Urdf(description)
     names = [name for name in list(urdf.model.names)[1:] if name not in description.locked_joints]
+    mimics, every = _mimics(urdf), _names(urdf.root, "joint")
     for name in joints:
         if name not in names:
             raise UnknownNameError("joint", name, names)
         if name in locked:
             raise InvalidValueError(f"locked_joints.{name}", locked[name], "of no joint in joints")
-    standing = set(names) - set(joints) - _mimics(urdf).keys()
+    led = {name for name, (leader, _, _) in mimics.items() if leader in every}
+    standing = set(names) - set(joints) - led
     others = {name: _neutral(urdf, name) for name in names if name in standing}
     return without_joints(description, {**others, **locked})
 
@@ -111,14 +126,17 @@ def lock_joints(
 ) -> tuple[pin.Model, pin.GeometryModel]:
     """Return a URDF's models without joints locked at positions [rad or m], and their followers."""
     positions = _locked_positions(urdf, given)
-    for name, (leader, _, _) in _mimics(urdf).items():
-        if name not in positions:
-            moves = urdf.model.existJointName(leader)
-            raise RobotDescriptionError(
-                f"joint {name!r} mimics {leader!r}, which "
-                f"{'moves' if moves else 'is no joint'}: lock {'either' if moves else 'it'} by "
-                f"locked_joints={{{leader if moves else name!r}: position}}"
-            )
+    free = {name: mimic[0] for name, mimic in _mimics(urdf).items() if name not in positions}
+    if free:
+        name, leader = next(iter(free.items()))
+        lost = {j for j, head in free.items() if not urdf.model.existJointName(head)}
+        heads = sorted(set(free.values()) - free.keys() - {free[j] for j in lost} | lost)
+        listed = ", ".join(f"{head!r}: position" for head in heads or [name])
+        raise RobotDescriptionError(
+            f"joint {name!r} mimics {leader!r}, which "
+            f"{'is no joint' if name in lost else 'moves'}: lock by locked_joints={{{listed}}}, or "
+            "name the joints that move as joints=[...]"
+        )
     if not positions:
         return urdf.model, geometry
     q = pin.neutral(urdf.model)
@@ -220,16 +238,11 @@ def _cut(root: ElementTree.Element, joints: Iterable[str]) -> None:
         name = waiting.pop()
         if name not in known:
             raise UnknownNameError("joint to cut at", name, known)
-        child = _end(known[name], "child")
-        waiting += [j for j, joint in known.items() if _end(joint, "parent") == child]
+        child = end_link(known[name], "child")
+        waiting += [j for j, joint in known.items() if end_link(joint, "parent") == child]
         for element in (known[name], links.get(child)):
             if element is not None and element in root:
                 root.remove(element)
-
-
-def _end(joint: ElementTree.Element, kind: str) -> str:
-    end = joint.find(kind)
-    return "" if end is None else end.get("link", "")
 
 
 def _names(root: ElementTree.Element, kind: str) -> set[str]:
@@ -238,8 +251,8 @@ def _names(root: ElementTree.Element, kind: str) -> set[str]:
 
 def _without_pairs(srdf: str, links: set[str]) -> str:
     root = parse_robot_xml(srdf, "SRDF")
-    for pair in root.findall("disable_collisions"):
-        if {pair.get("link1"), pair.get("link2")} & links:
+    for pair in [entry for tag in PAIR_ENTRIES for entry in root.findall(tag)]:
+        if {pair.get(key) for key in ("link", "link1", "link2")} & links:
             root.remove(pair)
     return ElementTree.tostring(root, encoding="unicode")
 

@@ -10,24 +10,35 @@ from typing import NamedTuple
 import numpy as np
 import pinocchio as pin
 
-from densarm.arms.collision_shapes import differentiable_geometry, evenly_filled
+from densarm.arms.collision_shapes import (
+    differentiable_geometry,
+    evenly_filled,
+    thicken_flat_shapes,
+)
 from densarm.arms.description import RobotDescription, parse_robot_xml
 from densarm.arms.joints import lock_joints
 from densarm.arms.link_pieces import CutGeometry, cut_into_pieces
+from densarm.arms.masses import (
+    DEFAULT_DENSITY,
+    add_masses,
+    links_without_inertial,
+    needed_masses,
+)
 from densarm.arms.self_collision import (
     ExcludedPair,
     add_self_collision_pairs,
     remove_always_colliding_pairs,
+    unknown_links,
 )
 from densarm.arms.urdf import Urdf
 from densarm.errors import InvalidValueError, RobotDescriptionError, UnknownNameError
 from densarm.scene.obstacles import geometry_objects
 from densarm.scene.scene import Attachment
 from densarm.scene.shapes import FARTHEST
+from densarm.values.arrays import Array
 from densarm.values.checks import finite_vector, unit_quaternion
 
-_SAMPLES = 5
-_SINGULAR = 1e-10
+_NEAR = 10.0  # [m] from the world's origin, up to which models are about that
 _COLOR = np.array([0.36, 0.42, 0.58, 1.0])  # of held bodies; links are as a rule white or grey
 
 
@@ -44,6 +55,16 @@ class RobotModels(NamedTuple):
     """The collision meshes that were read, by their path from the folder that holds them all."""
     links_without_collision: tuple[str, ...]
     """The links that the URDF draws and gives no collision geometry."""
+    remarks: tuple[str, ...]
+    """What was taken otherwise than the URDF and SRDF have it, one phrase each."""
+    links_without_mass: tuple[str, ...]
+    """The links that joints move without any mass, where the mass matrix is singular for them."""
+    origin: Array
+    """The point of the world about which they are (3,) [m].
+
+    It is that of the first joint, if that is far from the world's own: dynamics about a point 1 km
+    off lose six digits, and about one 500 km off all of them.
+    """
 
 
 class RobotOutline(NamedTuple):
@@ -66,24 +87,29 @@ def build_models(description: RobotDescription) -> RobotModels:
     """Build Pinocchio's model and collision geometry of an arm."""
     urdf = Urdf(description)
     try:
-        model, collision = _placed_models(description, urdf, pin.GeometryType.COLLISION)
-        _require_arm(model)
+        model, collision, origin = _placed_models(description, urdf, pin.GeometryType.COLLISION)
+        _require_arm(model, urdf)
         if collision.ngeoms == 0:
             raise RobotDescriptionError(
                 f"robot {description.name!r}: the URDF has no <collision> geometry, so no distance "
                 "can be computed: add shapes or meshes to its links"
             )
         files = _mesh_files(collision)
-        drawn = collision
-        collision = differentiable_geometry(model, drawn, description.shapes)
+        flat = thicken_flat_shapes(model, collision)
+        described = collision
+        collision = differentiable_geometry(model, described, description.shapes)
     except RobotDescriptionError as error:
         raise _with_advice(error, urdf.links_without_collision) from None
+    if description.inertia == "from_shapes":
+        lacking = links_without_inertial(urdf.root)
+        add_masses(model, described, lacking, description.density or DEFAULT_DENSITY)
+    needed = needed_masses(model)
     excluded = add_self_collision_pairs(model, collision, description.srdf)
     excluded += remove_always_colliding_pairs(model, collision)
     cut = CutGeometry(collision, excluded, frozenset())
     if description.shapes != "capsule":
         everywhere = description.shapes == "pieces"
-        cut = cut_into_pieces(model, collision, drawn, excluded, everywhere=everywhere)
+        cut = cut_into_pieces(model, collision, described, excluded, everywhere=everywhere)
     collision = cut.geometry
     _attach(model, collision, description.attachments, cut.self_pieces)
     for attachment in description.attachments:
@@ -91,8 +117,9 @@ def build_models(description: RobotDescription) -> RobotModels:
             items = _attached_shapes(model, attachment)
             inertia = evenly_filled(items, attachment.mass)
             model.appendBodyToJoint(items[0].parentJoint, inertia, pin.SE3.Identity())
-    without_collision = urdf.links_without_collision
-    return RobotModels(model, *cut, files, without_collision)
+    remarks = (*urdf.remarks, *flat, *unknown_links(model, description.srdf))
+    drawn = urdf.links_without_collision
+    return RobotModels(model, *cut, files, drawn, remarks, needed, origin)
 
 
 def build_collision_meshes(description: RobotDescription) -> pin.GeometryModel:
@@ -102,7 +129,7 @@ def build_collision_meshes(description: RobotDescription) -> pin.GeometryModel:
 
 def build_visual_model(description: RobotDescription) -> pin.GeometryModel:
     """Build Pinocchio's visual geometry, whose meshes take most of an arm's loading time."""
-    model, visual = _placed_models(description, Urdf(description), pin.GeometryType.VISUAL)
+    model, visual, _ = _placed_models(description, Urdf(description), pin.GeometryType.VISUAL)
     _attach(model, visual, description.attachments)
     return visual
 
@@ -114,7 +141,7 @@ def robot_outline(description: RobotDescription) -> RobotOutline:
         mesh.tag = "box"
         mesh.attrib = {"size": "1 1 1"}
     description = replace(description, urdf=ElementTree.tostring(root, encoding="unicode"))
-    model, geometry = _placed_models(description, Urdf(description), pin.GeometryType.COLLISION)
+    model, geometry, _ = _placed_models(description, Urdf(description), pin.GeometryType.COLLISION)
     geometry = differentiable_geometry(model, geometry)
     excluded = add_self_collision_pairs(model, geometry, description.srdf)
     _attach(model, geometry, description.attachments)
@@ -136,13 +163,17 @@ def end_effector_frame(model: pin.Model, name: str | None) -> int:
 
 def _placed_models(
     description: RobotDescription, urdf: Urdf, kind: pin.GeometryType
-) -> tuple[pin.Model, pin.GeometryModel]:
-    """Return the model without locked joints and the geometry as the URDF has it, on their base."""
+) -> tuple[pin.Model, pin.GeometryModel, Array]:
+    """Return the model without locked joints, the geometry as the URDF has it, and their origin."""
     model, geometry = lock_joints(urdf, urdf.geometry(kind), description.locked_joints)
     placement = finite_vector("base_placement", description.base_placement, 7)
     placement[3:] = unit_quaternion("base_placement orientation", placement[3:])
-    _place_base(model, geometry, pin.XYZQUATToSE3(placement))
-    return model, geometry
+    base = pin.XYZQUATToSE3(placement)
+    first = base.act(model.jointPlacements[1].translation) if model.njoints > 1 else np.zeros(3)
+    origin = first if _NEAR < np.linalg.norm(first) < FARTHEST else np.zeros(3)
+    base.translation -= origin
+    _place_base(model, geometry, base)
+    return model, geometry, origin
 
 
 def _place_base(model: pin.Model, geometry: pin.GeometryModel, base: pin.SE3) -> None:
@@ -174,17 +205,24 @@ def _with_advice(error: RobotDescriptionError, drawn_only: tuple[str, ...]) -> E
     return error
 
 
-def _require_arm(model: pin.Model) -> None:
+def _require_arm(model: pin.Model, urdf: Urdf) -> None:
     if model.nv == 0:
         raise RobotDescriptionError("the robot has no joint to move")
-    for joint, name in zip(list(model.joints)[1:], list(model.names)[1:], strict=True):
-        reason = _unusable(model, joint) or _immovable(model, joint)
+    joints = list(zip(list(model.joints)[1:], list(model.names)[1:], strict=True))
+    stuck = [name for joint, name in joints if joint.nq == 1 and len({*_limits(model, joint)}) == 1]
+    for joint, name in joints:
+        reason = _unusable(model, joint) or _immovable(model, joint, stuck)
         if reason:
             raise RobotDescriptionError(f"joint {name!r} {reason}")
-    for name, inertia in zip(model.names, model.inertias, strict=True):
+    for joint, inertia in enumerate(model.inertias):
         if inertia.mass < 0.0:
-            raise RobotDescriptionError(f"the links that joint {name!r} moves have a negative mass")
-    _require_inertia(model)
+            fixed = {frame.name for frame in model.frames if frame.parentJoint == joint}
+            link, mass = min(
+                urdf.masses().items(), key=lambda item: (item[0] not in fixed, item[1])
+            )
+            raise RobotDescriptionError(
+                f"link {link!r} has the negative mass {mass:g}: its <inertial> needs one above zero"
+            )
 
 
 def _unusable(model: pin.Model, joint: pin.JointModel) -> str:
@@ -200,32 +238,19 @@ def _unusable(model: pin.Model, joint: pin.JointModel) -> str:
     return ""
 
 
-def _immovable(model: pin.Model, joint: pin.JointModel) -> str:
-    low, high = model.lowerPositionLimit[joint.idx_q], model.upperPositionLimit[joint.idx_q]
+def _limits(model: pin.Model, joint: pin.JointModel) -> tuple[float, float]:
+    return model.lowerPositionLimit[joint.idx_q], model.upperPositionLimit[joint.idx_q]
+
+
+def _immovable(model: pin.Model, joint: pin.JointModel, stuck: list[str]) -> str:
+    low, high = _limits(model, joint)
     if joint.nq == 2 or low < high:
         return ""
     if low == high:
-        mend = "widen them, make it continuous, or lock it"
+        listed = ", ".join(f"{name!r}: position" for name in stuck)
+        mend = f"widen them, make it continuous, or lock by locked_joints={{{listed}}}"
         return f"cannot move, as both its limits are {low:g}: {mend}"
     return f"has a lower limit {low:g} above its upper limit {high:g}"
-
-
-def _require_inertia(model: pin.Model) -> None:
-    """Refuse joints that make the mass matrix singular, at rest or at random configurations."""
-    data = model.createData()
-    random = np.random.default_rng(0)
-    for k in range(_SAMPLES):
-        step = np.minimum(k, 1) * random.uniform(-np.pi, np.pi, model.nv)
-        mass = pin.crba(model, data, pin.integrate(model, pin.neutral(model), step))
-        pin.cholesky.decompose(model, data)
-        # The inertia about a joint while the joints after it are free, and while they are held.
-        enough = (_SINGULAR * np.diagonal(mass) < data.D) & np.isfinite(data.D)
-        if not enough.all():
-            name = list(model.names)[1:][int(np.flatnonzero(~enough)[-1])]
-            raise RobotDescriptionError(
-                f"joint {name!r} moves no mass, or an inertia that is not positive, so the mass "
-                "matrix is singular: give its links an <inertial> with their mass, or lock it"
-            )
 
 
 def _attach(

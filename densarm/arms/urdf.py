@@ -3,7 +3,7 @@
 import os
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Callable, Sequence
-from copy import deepcopy
+from copy import copy, deepcopy
 from pathlib import Path
 from typing import TypeVar
 
@@ -16,16 +16,19 @@ from densarm.arms.description import (
     data_wheel_folder,
     parse_robot_xml,
 )
-from densarm.errors import RobotDescriptionError
-from densarm.scene.mesh import COAL_MESSAGES
+from densarm.errors import DensarmError, InvalidValueError, RobotDescriptionError
+from densarm.scene.mesh_file import read_mesh
+from densarm.values.arrays import Array
+from densarm.values.checks import finite_vector
 from densarm.values.files import captured_stderr
 
 T = TypeVar("T")
 
-# Reads a file again once it has changed. OBB is the cheapest tree whose vertices Python can read.
+# Reads a file again once it has changed.
 _MESHES = coal.CachedMeshLoader(coal.BV_OBB)
 
 _ELEMENTS = ("collision", "visual")
+_SIZES = ("size", "radius", "length", "scale")
 
 _URDFDOM_MESSAGES = rb"(?:Error|Warning): (?:.*\n)+? +at line \d+ in .*\n"
 
@@ -35,6 +38,13 @@ class Urdf:
 
     def __init__(self, description: RobotDescription) -> None:
         self.root = parse_robot_xml(description.urdf, "URDF")
+        self.root.attrib.setdefault("name", description.name)
+        if self.root.find("link") is None:
+            raise RobotDescriptionError("URDF: it has no <link>")
+        _require_one_parent(self.root)
+        _require_positive_limits(self.root)
+        self.remarks = _without_empty_shapes(self.root)
+        """What it leaves out, one phrase each."""
         drawn = [link for link in self.root.findall("link") if link.find("visual") is not None]
         self.links_without_collision = tuple(
             link.get("name", "") for link in drawn if link.find("collision") is None
@@ -47,6 +57,7 @@ class Urdf:
             for folder in description.package_dirs
         ]
         self._capsules = {name: _rename_capsules(self.root, name) for name in _ELEMENTS}
+        self._meshes = {name: _take_meshes(self.root, name) for name in _ELEMENTS}
         self.model: pin.Model = _from_urdf(lambda: pin.buildModelFromXML(self._text()))
         """The model, of all joints that the URDF has."""
         for link in self.root.findall("link"):
@@ -59,15 +70,39 @@ class Urdf:
     def geometry(self, kind: pin.GeometryType) -> pin.GeometryModel:
         """Return the collision or visual geometry."""
         element = kind.name.lower()
-        _resolve_meshes(self.root, element, self._folders)
         text = self._text()
-        geometry = _from_urdf(
-            lambda: pin.buildGeomFromUrdfString(self.model, text, kind, mesh_loader=_MESHES)
-        )
+        geometry = _from_urdf(lambda: pin.buildGeomFromUrdfString(self.model, text, kind))
         for item in geometry.geometryObjects:
             if item.name in self._capsules[element] and isinstance(item.geometry, coal.Cylinder):
-                item.geometry = coal.Capsule(item.geometry.radius, 2.0 * item.geometry.halfLength)
+                radius, length = item.geometry.radius, 2.0 * item.geometry.halfLength
+                item.geometry = coal.Capsule(radius, length) if length else coal.Sphere(radius)
+            if item.name in self._meshes[element]:
+                link = self.model.frames[item.parentFrame].name
+                self._put_mesh(item, self._meshes[element][item.name], link)
         return geometry
+
+    def _put_mesh(self, item: pin.GeometryObject, mesh: ElementTree.Element, link: str) -> None:
+        """Let a shape have the mesh that the URDF names."""
+        name = mesh.get("filename", "")
+        file = _mesh_file(name, self._folders)
+        if file is None:
+            folders = ", ".join(self._folders)
+            raise RobotDescriptionError(
+                f"URDF: mesh {name!r} of link {link!r} could not be found in {folders}; "
+                "name the folders that hold its package as package_dirs"
+            )
+        try:
+            item.meshScale = _scale(mesh.get("scale", "1 1 1"))
+            item.geometry, item.meshPath = read_mesh(file, item.meshScale, _MESHES), str(file)
+        except DensarmError as error:
+            raise RobotDescriptionError(f"URDF: mesh {name!r} of link {link!r}: {error}") from None
+
+    def masses(self) -> dict[str, float]:
+        """Return the masses [kg] that it gives its links."""
+        given = {link.get("name", ""): link.find("inertial/mass") for link in self.root}
+        return {
+            name: float(mass.get("value", 0)) for name, mass in given.items() if mass is not None
+        }
 
     def _text(self) -> str:
         return ElementTree.tostring(self.root, encoding="unicode")
@@ -86,6 +121,61 @@ def _collide_as_drawn(link: ElementTree.Element, which: str) -> None:
         link.append(collision)
 
 
+def _require_one_parent(root: ElementTree.Element) -> None:
+    parents: dict[str, tuple[str, str]] = {}
+    for joint in root.findall("joint"):
+        name, link = joint.get("name", ""), end_link(joint, "child")
+        parent = end_link(joint, "parent")
+        if link and link in parents:
+            first, other = parents[link]
+            raise RobotDescriptionError(
+                f"URDF: link {link!r} has two parents, {first!r} by joint {other!r} and {parent!r} "
+                f"by joint {name!r}: let one joint carry it"
+            )
+        parents[link] = parent, name
+
+
+def _require_positive_limits(root: ElementTree.Element) -> None:
+    """Refuse by the joint's name what the parser refuses without."""
+    for joint in [joint for joint in root.findall("joint") if joint.get("type") != "fixed"]:
+        for limit in joint.findall("limit"):
+            for key in ("effort", "velocity"):
+                if max(_numbers(limit.get(key, "")), default=0.0) < 0.0:
+                    raise RobotDescriptionError(
+                        f"URDF: joint {joint.get('name')!r} has the {key} limit {limit.get(key)}: "
+                        "it must be above zero, or zero for none"
+                    )
+
+
+def _without_empty_shapes(root: ElementTree.Element) -> tuple[str, ...]:
+    """Take out shapes whose every size is zero, and tell of those meant for collision."""
+    remarks = []
+    for link in root.findall("link"):
+        for item in [item for element in _ELEMENTS for item in link.findall(element)]:
+            shapes = [shape for geometry in item.findall("geometry") for shape in geometry]
+            sizes = [_numbers(shape.get(key, "")) for shape in shapes[:1] for key in _SIZES]
+            if any(sizes) and not any(x != 0.0 for numbers in sizes for x in numbers):
+                link.remove(item)
+                if item.tag == "collision":
+                    shape = f"collision {shapes[0].tag} of link {link.get('name')!r}"
+                    remarks.append(f"{shape} has no size: left out")
+    return tuple(remarks)
+
+
+def _numbers(text: str) -> list[float]:
+    """Return the numbers of a text; none where the parser is to say what is wrong with it."""
+    try:
+        return [float(part) for part in text.split()]
+    except ValueError:
+        return []
+
+
+def end_link(joint: ElementTree.Element, kind: str) -> str:
+    """Return the name of a joint's "parent" or "child"."""
+    end = joint.find(kind)
+    return "" if end is None else end.get("link", "")
+
+
 def _rename_capsules(root: ElementTree.Element, element: str) -> set[str]:
     """Call capsules cylinders, which the parser knows, and return their names in Pinocchio."""
     names = set()
@@ -98,17 +188,23 @@ def _rename_capsules(root: ElementTree.Element, element: str) -> set[str]:
     return names
 
 
-def _resolve_meshes(root: ElementTree.Element, element: str, folders: Sequence[str]) -> None:
-    for link in root.iter("link"):
-        for mesh in link.iterfind(f"{element}//mesh"):
-            name = mesh.get("filename", "")
-            file = _mesh_file(name, folders)
-            if file is None:
-                raise RobotDescriptionError(
-                    f"URDF: mesh {name!r} of link {link.get('name')!r} could not be found in "
-                    f"{', '.join(folders)}; name the folders that hold its package as package_dirs"
-                )
-            mesh.set("filename", str(file))
+def _take_meshes(root: ElementTree.Element, element: str) -> dict[str, ElementTree.Element]:
+    """Call meshes boxes, which need no file, and return them by their names in Pinocchio."""
+    meshes = {}
+    for link in root.findall("link"):
+        for index, item in enumerate(link.findall(element)):
+            shape = item.find("geometry/*[1]")
+            if shape is not None and shape.tag == "mesh":
+                meshes[f"{link.get('name')}_{index}"] = copy(shape)
+                shape.tag, shape.attrib = "box", {"size": "1 1 1"}
+    return meshes
+
+
+def _scale(text: str) -> Array:
+    try:
+        return finite_vector("scale", [float(word) for word in text.split()], 3)
+    except ValueError:
+        raise InvalidValueError("scale", text, "three finite numbers") from None
 
 
 def _mesh_file(name: str, folders: Sequence[str]) -> Path | None:
@@ -131,7 +227,7 @@ def _from_urdf(parse: Callable[[], T]) -> T:
     It also prints, and goes on without them, about shapes and inertias that it cannot read.
     """
     raised = ""
-    with captured_stderr(_URDFDOM_MESSAGES + b"|" + COAL_MESSAGES) as printed:
+    with captured_stderr(_URDFDOM_MESSAGES) as printed:
         try:
             result = parse()
         except (ValueError, RuntimeError) as error:

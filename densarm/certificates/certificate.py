@@ -16,6 +16,7 @@ from densarm.certificates.task import (
 )
 from densarm.values.arrays import Array
 from densarm.values.documented import documented
+from densarm.world.near_pairs import smallest_distances
 from densarm.world.stopping import StoppingCheck, StoppingTrajectory
 from densarm.world.swept_check import SweptCheck, SweptResult, SweptVerdict
 from densarm.world.world import World
@@ -62,7 +63,8 @@ def certify(task: Task, time: Array, q: Array, v: Array, tau: Array) -> Certific
 
     The parts: swept check of the whole motion against the scene and the arm itself, start and
     goal, limits of position, velocity, acceleration and torque, one-step replay of the dynamics,
-    and a clear stopping trajectory within the limits from every sample.
+    and a clear stopping trajectory within the limits from every sample. Torque limits do not apply
+    to commanded velocities, nor to an arm without masses, whose dynamics nothing can replay.
     """
     world = World(task.arm, task.scene)
     return Certificate(
@@ -172,15 +174,18 @@ def _limits(task: Task, q: Array, v: Array, tau: Array) -> Check:
     ratios = {
         "velocity": np.abs(v) / limits.velocity,
         "acceleration": np.abs(np.diff(v, axis=0, append=v[-1:])) / dt / limits.acceleration,
-        "torque": np.abs(tau) / limits.effort,
     }
-    outside = np.maximum(limits.lower - angles, angles - limits.upper)
+    if limited := task.input == Input.TORQUE and not arm.links_without_mass:
+        ratios["torque"] = np.abs(tau) / limits.effort
+    outside = limits.excess(angles)
     peaks = {name: _peak(ratio) for name, ratio in ratios.items()}
     parts = [
         f"{name} {peak:.0%} ({arm.joint_names[joint]}, t = {at * dt:.3f} s)"
         for name, (peak, at, joint) in peaks.items()
     ]
     detail = f"peaks of the limits: {', '.join(parts)}"
+    if not limited:
+        detail += "; torque limits do not apply"
     largest, at, joint = _peak(outside)
     margin, where = min((1.0 - peak, at) for peak, at, _ in peaks.values())
     if not largest <= _ROUNDING:
@@ -197,6 +202,9 @@ def _peak(values: Array) -> tuple[float, int, int]:
 
 
 def _replay(task: Task, q: Array, v: Array, tau: Array) -> Check:
+    if task.input == Input.TORQUE and task.arm.links_without_mass:
+        lacking = ", ".join(task.arm.links_without_mass)
+        return Check("replay", False, f"torque tells nothing: no mass of {lacking}", None, 0.0)
     errors = np.append(replay_errors(task, q, v, tau), 0.0)
     worst = int(np.argmax(errors))
     error, at = float(errors[worst]), worst * task.simulation.dt
@@ -221,12 +229,14 @@ def _stopping(task: Task, world: World, q: Array, v: Array) -> Check:
         return Check("stopping", False, detail, None, first * dt)
     looked_at = np.arange(0, len(q), 1 + len(q) // _RESTS)
     ends = arm.configurations(result.end[looked_at])
-    rest = np.array([world.distances(end).min(initial=np.inf) for end in ends])
+    rest = smallest_distances(world, ends)
     at, longest = float(looked_at[rest.argmin()] * dt), int(np.argmax(result.duration))
     detail = (
         f"proved clear from {len(q)} samples, longest stop {result.duration[longest]:.2g} s at "
         f"t = {longest * dt:.3f} s, {_nearest(rest.min(), at)} of {len(ends)} ends"
     )
+    if arm.links_without_mass:
+        detail += "; by acceleration limits alone"
     return Check("stopping", True, detail, _finite(rest.min()), at)
 
 

@@ -3,8 +3,10 @@
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, fields
 from enum import StrEnum
+from pathlib import Path
 from typing import Any
 
+import coal
 import numpy as np
 
 from densarm.arms.arm import Arm
@@ -12,6 +14,8 @@ from densarm.arms.description import RobotDescription
 from densarm.density.navigation_density import DensityParameters
 from densarm.density.unsafe_sets import SensingParameters
 from densarm.errors import DensarmError, InvalidValueError, RobotDescriptionError
+from densarm.scene.mesh import Mesh
+from densarm.scene.obstacles import geometry_objects
 from densarm.scene.scene import Scene
 from densarm.values.arrays import Array
 from densarm.values.checks import one_of, positive, positive_integer
@@ -23,6 +27,8 @@ REACHED_POSITION = 0.01
 
 REACHED_VELOCITY = 0.01
 """Largest velocity of a joint at the goal [rad/s or m/s]."""
+
+_LARGE = 10.0  # longest side of a mesh that is worth a remark [m]
 
 FORMAT = 2
 """Version of the JSON form."""
@@ -119,6 +125,16 @@ class Task:
                 q = self.arm.check_configuration(f"{key} configuration", getattr(self, key))
                 object.__setattr__(self, key, q)
 
+    @property
+    def large_meshes(self) -> dict[str, float]:
+        """Longest side [m] of each mesh above 10 m, link or obstacle: perhaps its unit is wrong."""
+        items = [i for i in self.arm.collision_model.geometryObjects if Path(i.meshPath).suffix]
+        bodies = (*self.scene, *(held.body for held in self.arm.description.attachments))
+        for body in bodies:
+            items += geometry_objects(body) if isinstance(body, Mesh) else []
+        sides = {item.name: _longest_side(item.geometry) for item in items}
+        return {name: side for name, side in sides.items() if side > _LARGE}
+
     def goal_error(self, q: Array) -> float:
         """Return the largest joint error at q (nq,) [rad or m]; NaN without a goal."""
         if self.goal is None:
@@ -178,6 +194,12 @@ class Task:
                 f"robot {arm.name!r}: its mesh files have changed since the recording"
             )
         return task
+
+
+def _longest_side(shape: coal.CollisionGeometry) -> float:
+    shape.computeLocalAABB()
+    box = shape.aabb_local
+    return float((box.max_ - box.min_).max())
 
 
 _TABLES: Mapping[str, type[Any]] = {

@@ -104,12 +104,16 @@ def print_run(run: Run, compiled: float) -> None:
     if run.detail:
         click.echo(run.detail)
     click.echo()
-    smallest = float(run.clearance.min())
+    smallest, by_velocity = float(run.clearance.min()), run.task.input == "velocity"
     figures = {
         "duration": f"{run.time[-1]:.3f} s",
         "min clearance": f"{smallest * 1e3:.4g} mm" if math.isfinite(smallest) else "no pairs",
         "goal error": "no goal" if run.task.goal is None else f"{run.goal_error:.2g} rad",
-        "peak torque": f"{run.peak_torque_ratio:.0%} of the limits",
+        "peak torque": (
+            "none, velocities are commanded"
+            if by_velocity
+            else f"{run.peak_torque_ratio:.0%} of the limits"
+        ),
         "planning": f"{run.plan_time:.3f} s, ready after {run.preparation_time:.2f} s",
     }
     if compiled > 0.0:
@@ -118,6 +122,13 @@ def print_run(run: Run, compiled: float) -> None:
         figures["tracking error"] = f"{run.tracking_error:.2g} rad"
     if run.replanned_at:
         figures["planned again"] = ", ".join(f"at t = {time:.3f} s" for time in run.replanned_at)
+    if run.task.arm.remarks:
+        figures["robot"] = "; ".join(run.task.arm.remarks)
+    if run.base_overlaps:
+        figures["not checked"] = f"{'; '.join(run.base_overlaps)}: neither moves"
+    if large := run.task.large_meshes:
+        sides = ", ".join(f"{name} {side:.3g} m" for name, side in large.items())
+        figures["large meshes"] = f"{sides}: is their unit right?"
     for label, value in figures.items():
         click.echo(f"{label:<{_COLUMN}}{value}")
     click.echo()

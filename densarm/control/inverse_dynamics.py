@@ -32,12 +32,16 @@ class InverseDynamics:
         terms: M (upper triangle) and H of the last update.
         rows: table of `limited_torque` (8, nv).
 
+    Raises:
+        RobotDescriptionError: the arm has links without a mass.
+
     Source: [ZNV] eq. 16-17; saturation [ZNV] eq. 13-14, applied to the attraction alone.
     """
 
     def __init__(
         self, arm: Arm, acceleration_limit: Array, kinematics: Kinematics | None = None
     ) -> None:
+        arm.require_masses("torque")
         self._updates_kinematics = kinematics is None
         self._kinematics = kinematics or Kinematics(arm)
         self.terms: tuple[Array, Array] = (

@@ -72,16 +72,23 @@ class FieldRegulation:
         self._field = field
         self._speed_law = speed_law
         self._gain = gains.velocity
-        self._dynamics = InverseDynamics(arm, HELD_SHARE * arm.limits.acceleration)
-        self._filter = BackupFilter(arm, speed_law, gains, period)
         self._scale = 0.0
         if inertia_at is not None:
             self._scale = 1.0 / float(arm.mass_matrix(inertia_at).diagonal().max())
-        self._dynamics.load()
         checked_state(arm, arm.configuration(np.zeros(arm.nv)), np.zeros(arm.nv))  # loads a kernel
+        if arm.links_without_mass:
+            return
+        self._dynamics = InverseDynamics(arm, HELD_SHARE * arm.limits.acceleration)
+        self._filter = BackupFilter(arm, speed_law, gains, period)
+        self._dynamics.load()
 
     def torque(self, t: float, q: ArrayLike, v: ArrayLike) -> Array:
-        """Act as `Controller.torque`."""
+        """Act as `Controller.torque`.
+
+        Raises:
+            RobotDescriptionError: the arm has links without a mass.
+        """
+        self._arm.require_masses("torque")
         q, v = checked_state(self._arm, q, v)
         self._dynamics.update(q, v)
         metric = self._scale * self._dynamics.mass_matrix() if self._scale > 0.0 else None

@@ -104,6 +104,7 @@ class Supervisor:
 
     Raises:
         InvalidValueError: a period that is not positive.
+        RobotDescriptionError: the arm has links without a mass, so that nothing could hold it.
     """
 
     def __init__(
@@ -114,6 +115,7 @@ class Supervisor:
         tolerances: Tolerances | None = Tolerances(),
         gains: Gains = HOLDING_GAINS,
     ) -> None:
+        arm.require_masses("a supervisor's torque")
         self.controller = controller
         self.status = Status()
         self.trusts_state = False

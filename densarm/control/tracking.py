@@ -34,9 +34,9 @@ from densarm.planning.motion import Motion, write_sample
 from densarm.values.arrays import Array
 from densarm.values.kernels import compiled
 from densarm.world.active_pairs import ActivePairs
+from densarm.world.near_pairs import least_distances
 from densarm.world.stopping import HELD_SHARE
-from densarm.world.swept_check import SweptCheck
-from densarm.world.world import World
+from densarm.world.world import DISTANCE_TOLERANCE, World
 
 _INTERVAL = 0.02  # [s] of the motion between computed distances
 _SMALLEST = 1e-6  # [m or rad], sensing distance where the motion leaves no distance to sense in
@@ -54,6 +54,14 @@ class DensityTracking:
     distance is below what the motion keeps from the unsafe set, so that Ψ = 1 on it and obstacles
     act only on an arm that was pushed off it. The torque is taken to be held for the motion's
     period: q̈_d is its mean over that time.
+
+    `velocity` tracks it with a plant that is told velocities, which needs no masses:
+
+    .. math::
+
+        u = \bar{\dot q}_d + \frac{K_p}{K_v} \nabla\rho(e)
+
+    with the mean of q̇_d over a period, inside the limits of velocity and acceleration.
 
     Args:
         world: the arm among obstacles.
@@ -96,10 +104,13 @@ class DensityTracking:
         distance = goal_distance or TorusDistance(arm)
         unsafe = [*_sensed_off(world, motion, sensing, self._kinematics), *unsafe_sets]
         self._density = NavigationDensity(arm, self.goal, unsafe, distance, density)
-        limit = HELD_SHARE * arm.limits.acceleration
-        self._dynamics = InverseDynamics(arm, limit, self._kinematics)
         self._gains = gains
         self._arrays: tuple[Any, ...] | None = None
+        if arm.links_without_mass:
+            self.velocity(0.0, self.goal, np.zeros(arm.nv))
+            return
+        limit = HELD_SHARE * arm.limits.acceleration
+        self._dynamics = InverseDynamics(arm, limit, self._kinematics)
         if isinstance(distance, TorusDistance):  # V by one kernel with all the rest, for its speed
             numbers = 0.0, 0.0, motion.period, distance.kappa, gains.position, gains.velocity
             sample = np.zeros((5, arm.nv))
@@ -117,7 +128,12 @@ class DensityTracking:
         self.tracking_error = 0.0
 
     def torque(self, t: float, q: ArrayLike, v: ArrayLike) -> Array:
-        """Act as `Controller.torque`."""
+        """Act as `Controller.torque`.
+
+        Raises:
+            RobotDescriptionError: the arm has links without a mass.
+        """
+        self._arm.require_masses("torque")
         q, v = checked_state(self._arm, q, v)
         self._kinematics.update(q)
         if self._arrays is None:
@@ -129,25 +145,46 @@ class DensityTracking:
         self.tracking_error = _tracking_torque(q, v, *self._arrays)
         return np.array(rows[TORQUE])
 
+    def velocity(self, t: float, q: ArrayLike, v: ArrayLike) -> Array:
+        """Act as `VelocityController.velocity`, v being the velocity commanded last."""
+        q, v = checked_state(self._arm, q, v)
+        self._kinematics.update(q)
+        motion, limits = self.motion, self._arm.limits
+        now, then = motion.sample(t), motion.sample(t + motion.period)
+        follow = (then.position - now.position) / motion.period
+        wanted = follow + self._gains.rate * self._attraction(q, now.position)
+        change = motion.period * HELD_SHARE * limits.acceleration
+        reached = np.clip(wanted, v - change, v + change)
+        return np.asarray(np.clip(reached, -limits.velocity, limits.velocity))
+
     def describe_stall(self, q: Array) -> str:
         """Return, as a phrase, why the arm rests short of the goal."""
         return self.motion.detail
 
     def _torque_by_any_distance(self, t: float, q: Array, v: Array) -> Array:
-        density, motion, gains = self._density, self.motion, self._gains
+        motion, gains = self.motion, self._gains
         point = motion.sample(t, lead=0.5 * motion.period)
-        density.set_goal(self._arm.configurations(point.position))
-        density.update(q)
+        attract = self._attraction(q, point.position)
         self._dynamics.update(q, v)
-        attract = np.empty(len(v))
-        density.write_gradient(density.parameters.gauge, attract)
-        self.tracking_error = float(np.abs(density.error(q)).max())
         brake = point.acceleration - gains.velocity * (v - point.velocity)
         return self._dynamics.torque(brake, gains.position * attract)
 
+    def _attraction(self, q: Array, wanted: Array) -> Array:
+        """Return ∇ρ (nv,) at q (nq,) towards joint positions (nv,), and keep the error."""
+        density, attract = self._density, np.empty(self._arm.nv)
+        density.set_goal(self._arm.configurations(wanted))
+        density.update(q)
+        density.write_gradient(density.parameters.gauge, attract)
+        self.tracking_error = float(np.abs(density.error(q)).max())
+        return attract
 
-def require_smooth_goal(density: DensityParameters, *, may_blend: bool) -> None:
+
+def require_smooth_goal(
+    density: DensityParameters, *, may_blend: bool, form: str = "tracking"
+) -> None:
     """Refuse a density whose gradient is singular or flat at the goal, or a blend not to be read.
+
+    The form of control is for the error.
 
     Raises:
         InvalidValueError: such a density.
@@ -161,7 +198,7 @@ def require_smooth_goal(density: DensityParameters, *, may_blend: bool) -> None:
         allowed = "0 in tracking, which lives at e = 0, where a blend leaves nothing of obstacles"
         raise InvalidValueError("density.blend_radius", density.blend_radius, allowed)
     if not is_smooth and not may_blend:
-        raise InvalidValueError("control.form", "tracking", f"'regulation' or 'plain' {reason}")
+        raise InvalidValueError("control.form", form, f"'regulation' or 'plain' {reason}")
     if not is_smooth and density.blend_radius == 0.0:
         raise InvalidValueError("density.blend_radius", 0.0, f"above 0 {reason}")
 
@@ -170,11 +207,13 @@ def _sensed_off(
     world: World, motion: Motion, sensing: SensingParameters, kinematics: Kinematics
 ) -> tuple[UnsafeSet, UnsafeSet]:
     """Return pairs and joint limits, sensed nowhere on a motion but where the arm is off it."""
-    arm, check = world.arm, SweptCheck(world, motion.margin)
+    arm = world.arm
     every = max(1, round(_INTERVAL / motion.period))
     angles = np.vstack([motion.position[::every], motion.position[-1:]])
     configurations = arm.configurations(angles)
-    least = np.array([check.distance_margin(q) for q in configurations]).min(axis=0)
+    held = motion.margin + DISTANCE_TOLERANCE
+    limit = held + sensing.distance / sensing.path_share  # beyond which all are sensed alike
+    least = least_distances(world, configurations, limit) - held
     angles = arm.angles(configurations)
     inside = np.minimum(angles - arm.limits.lower, arm.limits.upper - angles).min(axis=0)
     pair_sensing = np.clip(sensing.path_share * least, _SMALLEST, sensing.distance)

@@ -232,7 +232,10 @@ def _polished(
         return {"type": "eq", "fun": lambda z: scale * float(function(pair(z)[k])), "jac": slope}
 
     constraints = [on_boundary(f, k) for k, f in enumerate(functions) if f is not None]
-    found = minimize(square, free, jac=True, method="SLSQP", constraints=constraints)
+    precise = {"ftol": _TOLERANCE**2, "maxiter": 1000}  # of a square
+    found = minimize(
+        square, free, jac=True, method="SLSQP", constraints=constraints, options=precise
+    )
     violation = max(abs(each["fun"](found.x)) for each in constraints)
     polished = float(np.linalg.norm(np.subtract(*pair(found.x))))
     return polished if violation < 1e-6 and polished <= sampled else sampled

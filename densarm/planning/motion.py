@@ -123,7 +123,7 @@ class PlanningError(DensarmError):
     """There is no motion to the goal.
 
     Args:
-        outcome: infeasible, no_path or stuck.
+        outcome: infeasible, no_path, stuck or timed_out.
         detail: why, as a phrase.
         motion: how far the density leads where it gets stuck.
     """

@@ -8,6 +8,7 @@ from itertools import pairwise
 import numpy as np
 
 from densarm.arms.arm import Arm
+from densarm.arms.joints import POSITION_TOLERANCE
 from densarm.errors import InvalidValueError
 from densarm.planning.guide import FreeSpace, GuidePath, NoPath
 from densarm.values.arrays import Array
@@ -28,10 +29,11 @@ _LEAST_GAIN = 1e-3  # of a path's length; a shortcut that gains less is not wort
 class PathGuideParameters:
     """How long and how finely `PathGuide` searches; no clock decides anything."""
 
-    iterations: int = 50_000
-    """Samples that one search draws at most."""
+    iterations: int = 25_000
+    """Samples that one search draws at most. To find the nearest state of a tree takes the longer
+    the more it has: joint space is better searched again than for longer."""
 
-    near_share: float = 0.08
+    near_share: float = 0.16
     """Share of the first search's samples that are drawn near start and goal, and tried alone
     before the others: most paths need no more of the space, and are found sooner there, and
     shorter; 0 to 1. No more than 4^nv are, for what arms of few joints do not find soon is not
@@ -41,7 +43,7 @@ class PathGuideParameters:
     """How far beyond its positions at start and goal, and those between, a joint is near [rad or
     m]."""
 
-    searches: int = 2
+    searches: int = 3
     """Searches from scratch, each with its own seed, before giving up."""
 
     extension: float = 1.0
@@ -157,12 +159,13 @@ class PathGuide:
         limits = self._arm.limits
         below, above = (ends - limits.lower).min(axis=0), (limits.upper - ends).min(axis=0)
         margin = self._parameters.limit_margin
-        lower = limits.lower + np.minimum(margin, 0.5 * below)
-        return lower, limits.upper - np.minimum(margin, 0.5 * above)
+        # An end may exceed a limit by the tolerance, and is in the bounds all the same.
+        within = [np.minimum(margin, np.minimum(room, 0.5 * room)) for room in (below, above)]
+        return limits.lower + within[0], limits.upper - within[1]
 
     def _fault(self, q: Array) -> str | None:
-        limits, angles = self._arm.limits, self._arm.angles(q)
-        outside = np.flatnonzero((angles < limits.lower) | (angles > limits.upper))
+        excess = self._arm.limits.excess(self._arm.angles(q))
+        outside = np.flatnonzero(excess > POSITION_TOLERANCE)
         if outside.size:
             names = ", ".join(self._arm.joint_names[joint] for joint in outside)
             return f"is outside the position limits of {names}"

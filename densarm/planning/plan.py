@@ -43,8 +43,11 @@ _LIMIT_INSET = 0.002  # [rad or m] from position limits at which a motion leaves
 
 # Shares of the path margin and of the planner's iterations, tried in turn: most spaces are wide,
 # and a narrow passage may leave less distance than wanted. Where not all are to be spent, those
-# that are draw samples near both ends above all.
-_ATTEMPTS = ((1.0, 0.01), (0.25, 1.0), (0.05, 1.0))
+# that are draw samples near both ends above all. Under all margins but the last half of the
+# searches are made: what they do not find rather needs a smaller margin than more samples.
+_ATTEMPTS = ((1.0, 0.02), (0.25, 1.0), (0.05, 1.0))
+
+_AT_GOAL = 1e-7  # [rad or m]; a shorter way is left to feedback, for rounding shapes its curve
 
 _END_SHARE = 0.5  # of the clearance at start and goal that a path's margin may take
 _SMOOTH_SHARE = 0.5  # of a path's or curve's distance margin that the smooth path keeps
@@ -79,6 +82,7 @@ def plan_motion(
     sensing: SensingParameters = SensingParameters(),
     search: PathGuideParameters = PathGuideParameters(),
     timing: TimingParameters = TimingParameters(),
+    time_limit: float = math.inf,
 ) -> Motion:
     """Plan a motion: sub-goals, the integral curve of ρ along them, a smooth path, its timing.
 
@@ -101,6 +105,7 @@ def plan_motion(
         sensing: sensing distances.
         search: how long and how finely a path is searched.
         timing: shares of the limits that the motion may use.
+        time_limit: longest duration of the motion [s]; never more than 10⁶ periods.
 
     Raises:
         PlanningError: there is no motion, with the outcome and the reason.
@@ -117,7 +122,7 @@ def plan_motion(
     if not path.is_clear:  # nor is the curve, but its steps are a share of its clearance
         kept = max(0.0, min(kept, _SMOOTH_SHARE * check.least_distance_margin(points)))
     motion = replace(
-        _timed(world, margin, kept, points, period, timing),
+        _timed(world, margin, kept, points, period, timing, time_limit),
         margin=margin,
         path=path,
         plan_time=planned.plan_time,
@@ -184,6 +189,8 @@ def _searched(
     began = time.perf_counter()
     for kept, effort in attempts.items():
         parameters = search
+        if kept > min(attempts):
+            parameters = replace(search, searches=math.ceil(0.5 * search.searches))
         if effort < 1.0:
             iterations = math.ceil(effort * search.iterations)
             parameters = replace(search, iterations=iterations, near_share=1.0, searches=1)
@@ -245,13 +252,19 @@ def _curve(
 
 
 def _timed(
-    world: World, margin: float, kept: float, curve: Array, period: float, timing: TimingParameters
+    world: World,
+    margin: float,
+    kept: float,
+    curve: Array,
+    period: float,
+    timing: TimingParameters,
+    time_limit: float,
 ) -> Motion:
     """Return a smooth motion near a curve (N, nq) that keeps so much beyond the margin [m]."""
     arm = world.arm
     length = float(np.linalg.norm(arm.difference(curve[:-1], curve[1:]), axis=1).sum())
-    if length == 0.0:
-        rest = np.tile(arm.angles(curve[0]), (2, 1))
+    if length < _AT_GOAL:
+        rest = np.tile(arm.angles(curve[-1]), (2, 1))
         return Motion(period, rest, np.zeros_like(rest))
     # TOPP-RA takes a tenth of a second to import.
     from densarm.planning.smoothing import smooth_path
@@ -263,7 +276,7 @@ def _timed(
         raise PlanningError(Outcome.NO_PATH, reason)
     stops = StoppingTrajectory(arm, timing.acceleration_share, timing.torque_share)
     stopping = StoppingCheck(world, stops, margin + _STOP_SHARE * kept)
-    return time_path(arm, path, length, period, timing, stopping)
+    return time_path(arm, path, length, period, timing, stopping, time_limit)
 
 
 def inside_limits(check: SweptCheck, q: Array) -> Array:

@@ -52,7 +52,7 @@ def run(
     seed: int | None = None,
     on_progress: OnProgress = lambda _: None,
 ) -> Run:
-    """Plan and run a scenario's torque-driven closed loop.
+    """Plan and run a scenario's closed loop.
 
     Args:
         scenario: what to run: a `Scenario`, a known name, or the path of a TOML file.
@@ -79,7 +79,7 @@ def run(
 
 
 def run_by(scenario: Scenario, baseline: Baseline, on_progress: OnProgress = lambda _: None) -> Run:
-    """Run a scenario's torque-driven closed loop by any way to drive the arm, as `run`."""
+    """Run a scenario's closed loop by any way to drive the arm, as `run`."""
     began = time.perf_counter()
     world, task = scenario.world, scenario.task
     on_progress("planning")
@@ -100,13 +100,14 @@ def by_density(scenario: Scenario, guide: Guide | None = None, *, replans: bool 
     """Return what drives an arm by the density, in the scenario's form and along its guide.
 
     A guide replaces the scenario's own. Where the plan loses the arm there is a new one, if it
-    `replans`.
+    `replans`, and torque, not velocity, drives the arm.
 
     Raises:
         PlanningError: there is no way, or, without a guide's path, the density is stuck at once.
     """
     drive = _plan(scenario, scenario.start, guide)
-    if not replans or (guide is None and scenario.control.guide == "direct"):
+    is_told_velocity = scenario.control.form == ControlForm.VELOCITY
+    if not replans or is_told_velocity or (guide is None and scenario.control.guide == "direct"):
         return drive
 
     def plan_again(q: Array) -> Controller | None:
@@ -138,7 +139,7 @@ def _plan(scenario: Scenario, start: Array, guide: Guide | None) -> Drive:
     }
     law: dict[str, Any] = {"density": scenario.density, "sensing": scenario.sensing}
     distance = TorusDistance(scenario.arm, kappa=control.kappa)
-    if control.form != ControlForm.TRACKING:
+    if control.form in {ControlForm.REGULATION, ControlForm.PLAIN}:
         planned = plan_path(world, start, goal, chosen, **search)
         is_plain = control.form == ControlForm.PLAIN
         regulation = DensityRegulation(
@@ -166,6 +167,7 @@ def _plan(scenario: Scenario, start: Array, guide: Guide | None) -> Drive:
             kappa=control.kappa,
             period=period,
             timing=scenario.timing,
+            time_limit=scenario.simulation.time_limit,
         )
     except PlanningError as error:
         if error.motion is None:

@@ -7,9 +7,12 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from densarm.arms.arm import Arm, load_arm
 from densarm.arms.catalogue import scenario_paths
-from densarm.certificates.task import SimulationParameters, Task
+from densarm.arms.joint_space import sliding_joints
+from densarm.certificates.task import Input, SimulationParameters, Task
 from densarm.control.controller import Gains
 from densarm.control.speed_law import SpeedParameters
 from densarm.control.tracking import require_smooth_goal
@@ -45,6 +48,9 @@ class ControlForm(StrEnum):
     """To the goal by way of the sub-goals, [ZNV] eq. 17 with constant q_d."""
     PLAIN = "plain"
     """u = ∇ρ + d(q, q̇)."""
+    VELOCITY = "velocity"
+    """Along the timed trajectory by commanded velocities, which needs no masses of the arm. Those
+    held for several time steps jump beyond the acceleration limits, which is not certified."""
 
 
 @dataclass(frozen=True)
@@ -86,6 +92,7 @@ class Scenario:
     Raises:
         InvalidValueError: start or goal is not a configuration, the seed is not a whole number,
             or the density gives no feedback that settles at a goal.
+        RobotDescriptionError: torque is to drive an arm with links without a mass.
     """
 
     name: str
@@ -124,8 +131,11 @@ class Scenario:
             q = self.arm.check_configuration(f"{key} configuration", getattr(self, key))
             object.__setattr__(self, key, q)
         non_negative_integer("seed", self.seed)
-        may_blend = self.control.form != ControlForm.TRACKING
-        require_smooth_goal(self.density, may_blend=may_blend)
+        form = self.control.form
+        if form != ControlForm.VELOCITY:
+            self.arm.require_masses(f"control.form = {str(form)!r}")
+        may_blend = form in {ControlForm.REGULATION, ControlForm.PLAIN}
+        require_smooth_goal(self.density, may_blend=may_blend, form=str(form))
 
     @cached_property
     def world(self) -> World:
@@ -139,6 +149,7 @@ class Scenario:
             **{key: getattr(self, key) for key in _SHARED},
             margin=self.control.margin,
             kappa=self.control.kappa,
+            input=Input.VELOCITY if self.control.form == ControlForm.VELOCITY else Input.TORQUE,
             settings={"seed": self.seed, **{key: asdict(getattr(self, key)) for key in _SETTINGS}},
         )
 
@@ -153,6 +164,8 @@ class Scenario:
             raise InvalidValueError("goal", None, "given in a scenario")
         settings = task.settings
         control = {**settings.get("control", {}), "margin": task.margin, "kappa": task.kappa}
+        if task.input == Input.VELOCITY:
+            control["form"] = ControlForm.VELOCITY
         tables = {**settings, "control": control}
         return cls(
             **{key: getattr(task, key) for key in _SHARED},
@@ -235,6 +248,8 @@ class _RobotTable:
     acceleration: tuple[float, ...] | None = None
     shapes: str = "hull"
     collision_from_visual: str | None = None
+    inertia: str | None = None
+    density: float | None = None
 
 
 @dataclass(frozen=True)
@@ -265,5 +280,14 @@ def _configuration(arm: Arm, key: str, value: str | tuple[float, ...]) -> Array:
         if value not in arm.postures:
             raise UnknownNameError(f"posture for {key}", value, arm.postures)
         return arm.postures[value]
-    name = f"{key} (one number per joint, or a posture)"
-    return arm.configuration(finite_vector(name, value, arm.nv))
+    angles = finite_vector(f"{key} (one number per joint, or a posture)", value, arm.nv)
+    limits, turns = arm.limits, ~sliding_joints(arm.model)
+    outside = limits.excess(angles) > 0.0
+    for joint in np.flatnonzero(outside & turns & (np.abs(angles) > 2.0 * np.pi))[:1]:
+        low, high = limits.lower[joint], limits.upper[joint]
+        allowed = (
+            f"in radians, {low:.4g} to {high:.4g} for {arm.joint_names[joint]!r}, "
+            f"not {angles[joint]:g}: are these degrees?"
+        )
+        raise InvalidValueError(key, value, allowed)
+    return arm.configuration(angles)

@@ -11,22 +11,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from densarm.errors import DensarmError, FileContentError, InvalidValueError
+from densarm.scene.mesh_file import read_mesh
 from densarm.scene.obstacles import Obstacle
 from densarm.scene.shapes import convex_hull
 from densarm.values.arrays import Array, Vector
-from densarm.values.checks import finite_tuple, one_of, positive_tuple
+from densarm.values.checks import finite_tuple, one_of
 from densarm.values.documented import documented
-from densarm.values.files import captured_stderr
-
-_MAX_BYTES = 100_000_000  # of the largest mesh file that is read
-
-COAL_MESSAGES = rb"(?:eigen:|BVH ).*\n"
-"""Regular expression of what coal prints on standard error."""
 
 _CONCAVITY = 0.05  # CoACD's threshold, as a part of the mesh's extent; its own default
 _GROWTH = 1e-3  # of pieces, as a part of the mesh's extent; CoACD's fall short by up to 5e-5
 
 _SIGNS = list(product((-1.0, 1.0), repeat=3))
+
+Pieces = tuple[tuple[tuple[float, ...], ...], ...]
 
 
 @documented
@@ -44,8 +41,8 @@ class Mesh(Obstacle):
     out some of its surface.
 
     Raises:
-        InvalidValueError: neither path nor pieces, a scale that is not positive, pieces that
-            span no volume, or pieces of a file are asked for and CoACD is not installed.
+        InvalidValueError: neither path nor pieces, a scale of zero, pieces that span no volume or
+            reach beyond 1 km, or pieces of a file are asked for and CoACD is not installed.
         FileContentError: no such file, not a mesh, too large, without volume, or, for pieces, not
             closed.
     """
@@ -53,7 +50,7 @@ class Mesh(Obstacle):
     path: str | Path = ""
     """STL, OBJ or DAE file; read unless the pieces are given."""
     scale: Vector = (1.0, 1.0, 1.0)
-    """Factors x y z from the file's unit to metres."""
+    """Factors x y z from the file's unit to metres, a DAE's own unit applied; below 0 mirrors."""
     convex: str = "hull"
     """``"hull"``: the convex hull of all, which fills holes. ``"pieces"``: a decomposition."""
     pieces: Sequence[Sequence[Vector] | Array] | Array = ()
@@ -62,13 +59,15 @@ class Mesh(Obstacle):
     def __post_init__(self) -> None:
         super().__post_init__()
         one_of(f"{self.name}.convex", self.convex, ["hull", "pieces"])
-        scale = positive_tuple(f"{self.name}.scale", self.scale, 3)
+        scale = finite_tuple(f"{self.name}.scale", self.scale, 3)
+        if 0.0 in scale:
+            raise InvalidValueError(f"{self.name}.scale", scale, "three numbers other than 0")
         self._store(path=str(self.path), scale=scale)
         given = self.pieces.tolist() if isinstance(self.pieces, np.ndarray) else self.pieces
         if given:
             self._keep(given)
         elif self.path:
-            self._store(pieces=_pieces_of_file(Path(self.path), scale, self.convex))
+            self._store(pieces=self._pieces_of_file(scale))
         else:
             raise InvalidValueError(f"{self.name}.path", self.path, "the path of a mesh file")
 
@@ -90,7 +89,19 @@ class Mesh(Obstacle):
         except InvalidValueError:
             raise
         except (TypeError, DensarmError):
-            raise InvalidValueError(name, pieces, "corners x y z of pieces with a volume") from None
+            allowed = "corners x y z of pieces with a volume, within 1 km of their origin"
+            raise InvalidValueError(name, pieces, allowed) from None
+
+    def _pieces_of_file(self, scale: tuple[float, ...]) -> Pieces:
+        """Return the corners of the convex hulls that stand for the mesh of the file."""
+        mesh = read_mesh(Path(self.path), scale)
+        try:
+            whole = hull_corners(np.array(mesh.vertices()), f"the mesh of obstacle {self.name!r}")
+            return (whole,) if self.convex == "hull" else _enclosing_pieces(mesh)
+        except InvalidValueError:
+            raise
+        except DensarmError as error:
+            raise FileContentError(self.path, str(error)) from None
 
 
 def indexed_triangles(mesh: coal.BVHModelBase) -> tuple[Array, NDArray[np.int64]]:
@@ -100,38 +111,9 @@ def indexed_triangles(mesh: coal.BVHModelBase) -> tuple[Array, NDArray[np.int64]
     return np.array(mesh.vertices()), triangles
 
 
-Pieces = tuple[tuple[tuple[float, ...], ...], ...]
-
-
-def hull_corners(points: Array) -> tuple[tuple[float, ...], ...]:
+def hull_corners(points: Array, name: str = "a piece") -> tuple[tuple[float, ...], ...]:
     """Return the corners of the convex hull of points (N, 3) [m], which must span a volume."""
-    return tuple(map(tuple, np.array(convex_hull(points).points()).tolist()))
-
-
-def _pieces_of_file(path: Path, scale: tuple[float, ...], convex: str) -> Pieces:
-    """Return the corners of the convex hulls that stand for a mesh."""
-    mesh = _read(path, scale)
-    try:
-        whole = hull_corners(np.array(mesh.vertices()))
-        return (whole,) if convex == "hull" else _enclosing_pieces(mesh)
-    except InvalidValueError:
-        raise
-    except DensarmError as error:
-        raise FileContentError(path, str(error).replace("the set of points", "the mesh")) from None
-
-
-def _read(path: Path, scale: tuple[float, ...]) -> coal.BVHModelBase:
-    try:
-        size = path.stat().st_size
-    except (OSError, ValueError) as error:
-        raise FileContentError(path, getattr(error, "strerror", None) or "no such file") from None
-    if not path.is_file() or size > _MAX_BYTES:
-        raise FileContentError(path, f"not a mesh file of at most {_MAX_BYTES / 1e6:g} MB")
-    try:
-        with captured_stderr(COAL_MESSAGES):
-            return coal.MeshLoader().load(str(path), np.array(scale))
-    except (ValueError, RuntimeError):
-        raise FileContentError(path, "not a mesh in STL, OBJ or DAE") from None
+    return tuple(map(tuple, np.array(convex_hull(points, name).points()).tolist()))
 
 
 def _enclosing_pieces(mesh: coal.BVHModelBase) -> Pieces:

@@ -70,7 +70,11 @@ def moveit_obstacle(name: str, kind: str, sizes: Sequence[float], pose: pin.SE3)
 def moveit_mesh(name: str, vertices: Sequence[Sequence[float]], pose: pin.SE3) -> Obstacle:
     """Return the convex hull of a mesh whose vertices (N, 3) [m] a message or file lists."""
     points = np.array([finite_tuple(f"vertex of {name!r}", vertex, 3) for vertex in vertices])
-    return Mesh(name=name, pieces=[hull_corners(points.reshape(-1, 3))], **pose_fields(pose))
+    return Mesh(
+        name=name,
+        pieces=[hull_corners(points.reshape(-1, 3), f"mesh {name!r}")],
+        **pose_fields(pose),
+    )
 
 
 def moveit_pose(name: str, position: Sequence[float], orientation: Sequence[float]) -> pin.SE3:

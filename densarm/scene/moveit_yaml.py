@@ -41,6 +41,13 @@ def read_moveit_yaml(path: Path) -> Scene:
         state = _table("robot_state", scene.get("robot_state"))
         if _table("octomap", _table("octomap", world.get("octomap")).get("octomap")).get("data"):
             raise InvalidValueError("world.octomap", "cells", "empty: use meshes or boxes")
+        for key, size, plain in (("link_padding", "padding", 0.0), ("link_scale", "scale", 1.0)):
+            for item in _list(key, scene.get(key)):
+                entry = _table(key, item)
+                value, name = _numbers(key, [entry.get(size, plain)])[0], entry.get("link_name")
+                if value != plain:
+                    allowed = f"{plain:g}: set control.margin, the distance that all links keep"
+                    raise InvalidValueError(f"{key} of {name!r}", value, allowed)
         objects = _list("world.collision_objects", world.get("collision_objects"))
         held = _list("attached_collision_objects", state.get("attached_collision_objects"))
         frames = {_frame(_table("collision object", item)) for item in objects} - {""}
@@ -60,6 +67,7 @@ def read_moveit_yaml(path: Path) -> Scene:
 def _load(path: Path) -> Any:
     """Return the document, every scalar as text: YAML 1.1 would misread 1e-05 and names like 7.
 
+    Empty documents do not count, as ROS writes ``---`` after each message.
     Aliases, which make small files huge, and deep nesting are refused.
     """
     import yaml
@@ -74,13 +82,16 @@ def _load(path: Path) -> Any:
             if isinstance(event, yaml.AliasEvent) or depth > _DEEPEST:
                 line = event.start_mark.line + 1
                 raise FileContentError(path, f"line {line}: an alias, or nested too deeply")
-        return yaml.load(text, Loader=loader)
+        documents = [item for item in yaml.load_all(text, Loader=loader) if item not in (None, "")]
     except yaml.MarkedYAMLError as error:
         mark = error.problem_mark
         where = f"line {mark.line + 1}: " if mark is not None else ""
         raise FileContentError(path, f"{where}not YAML: {error.problem}") from None
     except yaml.YAMLError as error:
         raise FileContentError(path, f"not YAML: {str(error).splitlines()[0]}") from None
+    if len(documents) > 1:
+        raise FileContentError(path, f"holds {len(documents)} planning scenes, not one")
+    return documents[0] if documents else None
 
 
 def _obstacles(data: Any, folder: Path) -> list[Obstacle]:

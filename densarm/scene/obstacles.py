@@ -8,9 +8,10 @@ from typing import Any, ClassVar
 import coal
 import numpy as np
 import pinocchio as pin
+from numpy.typing import ArrayLike
 
-from densarm.errors import InvalidValueError
-from densarm.scene.shapes import box_hull, circumscribed_cylinder
+from densarm.errors import DensarmError, InvalidValueError
+from densarm.scene.shapes import FARTHEST, LARGEST, box_hull, circumscribed_cylinder
 from densarm.values.arrays import Vector
 from densarm.values.checks import (
     finite_number,
@@ -27,8 +28,9 @@ class Obstacle(ABC):
     """A named body at a fixed pose, the union of convex shapes. Its vectors are kept as tuples.
 
     Raises:
-        InvalidValueError: no name, a number that is not finite, no unit quaternion, or, of any
-            kind of obstacle, a size that is not positive.
+        InvalidValueError: no name, a number that is not finite, no unit quaternion, a position
+            1000 km away, or, of any kind of obstacle, a size that is not positive, above 1 km, or
+            next to nothing beside another.
     """
 
     _SIZES: ClassVar[tuple[str, ...]] = ()
@@ -47,12 +49,29 @@ class Obstacle(ABC):
             raise InvalidValueError("obstacle name", name, "a non-empty string")
         quaternion = unit_quaternion(f"{name}.orientation_xyzw", self.orientation_xyzw)
         position = finite_tuple(f"{name}.position", self.position, 3)
+        if not max(map(abs, position)) < FARTHEST:
+            raise InvalidValueError(f"{name}.position", position, "less than 1000 km away")
         self._store(position=position, orientation_xyzw=quaternion)
-        self._store(**{key: positive(f"{name}.{key}", getattr(self, key)) for key in self._SIZES})
+        for key in self._SIZES:
+            size = positive(f"{name}.{key}", getattr(self, key))
+            if size > LARGEST:
+                raise InvalidValueError(f"{name}.{key}", size, f"at most {LARGEST:g} m")
+            self._store(**{key: size})
 
     @abstractmethod
     def convex_shapes(self) -> tuple[coal.CollisionGeometry, ...]:
         """Return the shapes, in the body's frame, whose distances coal differentiates."""
+
+    def _require_hull(self, key: str, sizes: tuple[float, ...]) -> None:
+        """Refuse by its name what is too thin or too large for a hull."""
+        try:
+            self.convex_shapes()
+            is_usual = max(sizes) <= LARGEST
+        except DensarmError:
+            is_usual = False
+        if not is_usual:
+            allowed = f"at most {LARGEST:g} m, each above 1 nm and a millionth of the longest"
+            raise InvalidValueError(f"{self.name}.{key}", sizes, allowed)
 
     def _store(self, **values: Any) -> None:
         """Set fields while the obstacle is being made."""
@@ -85,7 +104,9 @@ class Box(Obstacle):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        self._store(size=positive_tuple(f"{self.name}.size", self.size, 3))
+        size = positive_tuple(f"{self.name}.size", self.size, 3)
+        self._store(size=size)
+        self._require_hull("size", size)
 
     def convex_shapes(self) -> tuple[coal.CollisionGeometry, ...]:
         """Return the hull of the corners, since coal's box errs where it nearly touches another."""
@@ -121,6 +142,10 @@ class Cylinder(Obstacle):
     length: float
     """Length [m]."""
 
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        self._require_hull("radius and length", (self.radius, self.length))
+
     def convex_shapes(self) -> tuple[coal.CollisionGeometry, ...]:
         """Return the circumscribed prism, since coal's cylinder has no reliable gradient."""
         return (circumscribed_cylinder(self.radius, self.length),)
@@ -151,6 +176,8 @@ class HalfSpace(Obstacle):
         # Scaling once more would change the last digit of what is already of unit length.
         unit = normal / length if abs(length - 1.0) > 1e-12 else normal
         offset = finite_number(f"{self.name}.offset", self.offset)
+        if not abs(offset) < FARTHEST:
+            raise InvalidValueError(f"{self.name}.offset", offset, "less than 1000 km away")
         self._store(normal=tuple(unit.tolist()), offset=offset)
 
     def convex_shapes(self) -> tuple[coal.CollisionGeometry, ...]:
@@ -158,20 +185,27 @@ class HalfSpace(Obstacle):
         return (coal.Halfspace(np.array(self.normal), self.offset),)
 
 
-def obstacle_pose(obstacle: Obstacle) -> pin.SE3:
-    """Return the pose of an obstacle's frame."""
-    return pin.XYZQUATToSE3(np.array([*obstacle.position, *obstacle.orientation_xyzw]))
+def obstacle_pose(obstacle: Obstacle, origin: ArrayLike = (0.0, 0.0, 0.0)) -> pin.SE3:
+    """Return the pose of an obstacle's frame, seen from a point of the world (3,) [m]."""
+    position = np.subtract(obstacle.position, origin)
+    return pin.XYZQUATToSE3(np.array([*position, *obstacle.orientation_xyzw]))
 
 
 def geometry_objects(
-    obstacle: Obstacle, joint: int = 0, frame: int = 0, placement: pin.SE3 | None = None
+    obstacle: Obstacle,
+    joint: int = 0,
+    frame: int = 0,
+    placement: pin.SE3 | None = None,
+    origin: ArrayLike = (0.0, 0.0, 0.0),
 ) -> list[pin.GeometryObject]:
     """Return an obstacle's convex shapes as Pinocchio's geometry objects.
 
-    A frame holds them, by its index and its placement against a joint; none if in the world.
+    A frame holds them, by its index and its placement against a joint; none if in the world, where
+    they are seen from a point (3,) [m].
     """
     shapes = obstacle.convex_shapes()
-    pose = obstacle_pose(obstacle) if placement is None else placement * obstacle_pose(obstacle)
+    pose = obstacle_pose(obstacle, origin)
+    pose = pose if placement is None else placement * pose
     return [
         pin.GeometryObject(name, joint, frame, pose, shape)
         for name, shape in zip(numbered(obstacle.name, len(shapes)), shapes, strict=True)

@@ -13,10 +13,17 @@ from densarm.values.arrays import Array
 CYLINDER_SIDES = 64
 """Sides of the prism that stands for a cylinder; it exceeds the radius by 0.12 %."""
 
+LARGEST = 1e3
+"""No point of a shape lies farther than this along an axis from its own origin [m].
+
+coal's distances to needles of 10 km are wrong, and to cubes of 1000 km at times -1.8e308 m.
+"""
+
 FARTHEST = 1e6
-"""No coordinate of a shape or joint lies as far away as this [m]."""
+"""No obstacle, shape or joint is placed as far away as this [m]."""
 
 _FLATNESS = 1e-6  # thickness, over the largest coordinate, of points that count as in one plane
+_THINNEST = 1e-9  # [m], likewise of points however near; of 1e-300 m Qhull ends the process
 _CELLS = 64  # along each side of a mesh whose hull is too fine for coal
 _KEPT = 512  # hulls, the last ones asked for
 
@@ -68,9 +75,11 @@ def extreme_points(shape: coal.CollisionGeometry) -> tuple[Array, float]:
 def _hull(content: bytes, name: str) -> coal.ConvexBase:
     points = np.frombuffer(content).reshape(-1, 3)
     # coal ends the process when it meets points that are not finite or that lie in one plane.
-    if not (np.abs(points) < FARTHEST).all():
-        raise RobotDescriptionError(f"{name} has vertices that are not finite, or beyond 1000 km")
-    if len(points) < 4 or _thickness(points) <= _FLATNESS * np.abs(points).max():
+    if not (np.abs(points) <= LARGEST).all():
+        reason = "has vertices that are not finite, or beyond 1 km from its origin"
+        raise RobotDescriptionError(f"{name} {reason}: is its unit right?")
+    thinnest = max(_THINNEST, _FLATNESS * np.abs(points).max(initial=0.0))
+    if len(points) < 4 or _thickness(points) <= thinnest:
         raise RobotDescriptionError(f"{name} has no convex hull: its vertices span no volume")
     try:
         return _qhull(points)

@@ -42,6 +42,9 @@ class PinocchioPlant:
         dt: time step [s].
         integrator: see `Integrator`.
 
+    Raises:
+        RobotDescriptionError: the arm has links without a mass.
+
     Source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7.
     """
 
@@ -50,6 +53,7 @@ class PinocchioPlant:
     def __init__(
         self, arm: Arm, dt: float = 0.001, integrator: Integrator = Integrator.SEMI_IMPLICIT_EULER
     ) -> None:
+        arm.require_masses("a plant driven by torque")
         self._model = arm.model
         self._data = arm.model.createData()
         self.dt = dt

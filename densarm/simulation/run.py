@@ -11,13 +11,13 @@ from zipfile import BadZipFile, ZipFile, is_zipfile
 import numpy as np
 
 from densarm.certificates.certificate import Certificate, certify
-from densarm.certificates.task import Task
+from densarm.certificates.task import Input, Task
 from densarm.errors import DensarmError, FileContentError
 from densarm.values.arrays import Array
 from densarm.values.documented import documented
 from densarm.values.files import atomic_file
 from densarm.values.outcome import Outcome
-from densarm.world.world import World
+from densarm.world.world import World, base_overlaps
 
 _MAX_BYTES = 4_000_000_000  # unpacked; the longest run of a seven-joint arm has half of it
 _UNIT_TOLERANCE = 1e-6
@@ -86,6 +86,11 @@ class Run:
         """What is proved about the run, computed anew from the record when first asked for."""
         return certify(self.task, self.time, self.q, self.v, self.tau)
 
+    @cached_property
+    def base_overlaps(self) -> tuple[str, ...]:
+        """As `World.base_overlaps`: what the certificate, being about motion, is not about."""
+        return base_overlaps(self.task.arm, self.task.scene)
+
     @property
     def certified(self) -> bool:
         """Whether the certificate holds in every part."""
@@ -104,12 +109,13 @@ class Run:
     def summary(self) -> dict[str, Any]:
         """Return the run's figures as JSON data; None for what is unknown or infinite."""
         smallest, error = float(self.clearance.min()), self.goal_error
+        by_torque = self.task.input == Input.TORQUE
         return {
             "outcome": str(self.outcome),
             "duration_s": float(self.time[-1]),
             "min_clearance_m": smallest if np.isfinite(smallest) else None,
             "goal_error_rad": error if np.isfinite(error) else None,
-            "peak_torque_ratio": self.peak_torque_ratio,
+            "peak_torque_ratio": self.peak_torque_ratio if by_torque else None,
             "plan_time_s": self.plan_time,
             "preparation_time_s": self.preparation_time,
             "certified": self.certified,

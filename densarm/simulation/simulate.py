@@ -15,12 +15,13 @@ from densarm.certificates.task import (
 )
 from densarm.control.controller import Controller, VelocityController
 from densarm.errors import InvalidValueError
-from densarm.simulation.plants import PinocchioPlant, Plant
+from densarm.simulation.plants import PinocchioPlant, Plant, SingleIntegrator
 from densarm.simulation.run import Run
 from densarm.values.arrays import Array
 from densarm.values.checks import finite_vector, one_of
 from densarm.values.outcome import Outcome
 from densarm.world.configurations import infeasibility
+from densarm.world.near_pairs import NearPairs
 from densarm.world.swept_check import SweptCheck
 from densarm.world.world import World
 
@@ -68,6 +69,7 @@ def simulate(
     Raises:
         InvalidValueError: start or goal is not a configuration, a plant of another time step or an
             unknown input, a controller without the method for it, or a torque that is not one.
+        RobotDescriptionError: no plant, and an arm with links without a mass.
     """
     driven = plant or PinocchioPlant(world.arm, parameters.dt, parameters.integrator)
     wanted = getattr(controller, "goal", None) if goal is None else goal
@@ -91,8 +93,13 @@ def simulate_task(
     plant: Plant | None = None,
     on_progress: OnProgress = lambda _: None,
 ) -> Run:
-    """Run a controller on a task; as `simulate`, which makes the task."""
+    """Run a controller on a task; as `simulate`, which makes the task.
+
+    None for a plant is the arm's model, or for a task of velocities the arm that has them.
+    """
     parameters = task.simulation
+    if plant is None and task.input == Input.VELOCITY:
+        plant = SingleIntegrator(world.arm, parameters.dt)
     driven = plant or PinocchioPlant(world.arm, parameters.dt, parameters.integrator)
     if driven.dt != parameters.dt:
         raise InvalidValueError("dt of the plant", driven.dt, f"the loop's, {parameters.dt}")
@@ -115,6 +122,9 @@ class _Loop:
     q: list[Array] = field(default_factory=list)
     v: list[Array] = field(default_factory=list)
     clearance: list[float] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        self._pairs = NearPairs(self.world)
 
     def run(self, on_progress: OnProgress) -> Run:
         task, p = self.task, self.task.simulation
@@ -169,13 +179,11 @@ class _Loop:
 
     def _record(self, q: Array, v: Array) -> str:
         """Keep a state; return what touches there, as a phrase."""
-        distance = self.world.distances(q)
+        distance, pair = self._pairs.smallest(q)
         self.q.append(q.copy())  # as may a plant
         self.v.append(v.copy())
-        self.clearance.append(float(distance.min(initial=np.inf)))
-        if self.clearance[-1] <= 0.0:
-            return " and ".join(self.world.pairs[int(distance.argmin())])
-        return ""
+        self.clearance.append(distance)
+        return " and ".join(self.world.pairs[pair]) if distance <= 0.0 else ""
 
     def _is_at_goal(self, q: Array, v: Array) -> bool:
         if self.task.goal is None or np.abs(v).max() > _HELD_SHARE * REACHED_VELOCITY:

@@ -10,10 +10,10 @@ from numpy.typing import ArrayLike
 
 from densarm.control.controller import Controller
 from densarm.control.speed_law import SpeedParameters
-from densarm.errors import UnknownNameError
+from densarm.errors import InvalidValueError, UnknownNameError
 from densarm.planning.motion import TimingParameters
 from densarm.scenarios.run import Drive, run_by
-from densarm.scenarios.scenario import Scenario
+from densarm.scenarios.scenario import ControlForm, Scenario
 from densarm.simulation.simulate import OnProgress
 from densarm.study.baselines import BASELINES, MAIN_PARAMETERS
 from densarm.study.problems import path_length
@@ -168,13 +168,15 @@ def compare(
 
     Raises:
         UnknownNameError: a baseline that there is not.
-        InvalidValueError: a number of starts below one, of tuning starts below zero, or a seed that
-            is not a whole number.
+        InvalidValueError: a number of starts below one, of tuning starts below zero, a seed that
+            is not a whole number, or a scenario that commands velocities.
         DensarmError: no random start was found.
     """
     for name in baselines:
         if name not in BASELINES:
             raise UnknownNameError("method", name, BASELINES)
+    if scenario.control.form == ControlForm.VELOCITY:
+        raise InvalidValueError("control.form", "velocity", "one of torque, as all methods are")
     seed = scenario.seed if seed is None else seed
     scenario = replace(
         scenario,

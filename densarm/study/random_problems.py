@@ -91,7 +91,7 @@ class Workspace:
         self._lower, self._upper = np.maximum(limits.lower, -turn), np.minimum(limits.upper, turn)
         random = np.random.default_rng(0)
         tips = np.array([self.tip(self.draw(random)) for _ in range(_SAMPLES)])
-        self.centre: Array = self._data.oMi[1].translation.copy()
+        self.centre: Array = self._data.oMi[1].translation + arm.origin
         """Where the first joint is (3,) [m]."""
         self.reach = float(np.linalg.norm(tips - self.centre, axis=1).max())
         """Largest distance of the end effector from there, of many at random [m]."""
@@ -104,7 +104,8 @@ class Workspace:
         """Return the position of the end effector (3,) at q (nq,) [m]."""
         frame = self.arm.end_effector_frame
         pin.forwardKinematics(self.arm.model, self._data, q)
-        return np.array(pin.updateFramePlacement(self.arm.model, self._data, frame).translation)
+        pose = pin.updateFramePlacement(self.arm.model, self._data, frame)
+        return np.array(pose.translation) + self.arm.origin
 
 
 @dataclass(frozen=True)

@@ -23,7 +23,8 @@ from densarm.scene.obstacles import Sphere
 from densarm.scene.scene import Scene
 from densarm.values.arrays import Array
 from densarm.values.checks import positive_integer
-from densarm.world.world import COAL_TOLERANCE, World
+from densarm.world.pair_queries import COAL_TOLERANCE
+from densarm.world.world import World
 
 _PERIOD = 0.001  # of the swing [s]
 _DURATION = 2.0  # [s]

@@ -38,8 +38,9 @@ def read_text(path: Path) -> str:
 
 def read_toml(path: Path) -> dict[str, Any]:
     """Return the content of a TOML file; FileContentError, with the line, if it is not TOML."""
+    text = read_text(path)
     try:
-        return tomllib.loads(read_text(path))
+        return tomllib.loads(text)
     except ValueError as error:  # also for a date that no calendar has
         raise FileContentError(path, f"not TOML: {error}") from None
     except RecursionError:

@@ -8,6 +8,7 @@ from itertools import product
 import coal
 import numpy as np
 import pinocchio as pin
+from numpy.typing import ArrayLike
 
 from densarm.arms.arm import Arm
 from densarm.scene.obstacles import geometry_objects
@@ -63,15 +64,15 @@ def arm_bodies(arm: Arm) -> tuple[Body, ...]:
     return tuple(_body(item, tuple(item.meshColor[:3].tolist())) for item in visual + plain)
 
 
-def obstacle_bodies(scene: Scene) -> tuple[Body, ...]:
-    """Return the obstacles, in the shapes that distances are measured to.
+def obstacle_bodies(scene: Scene, origin: ArrayLike = (0.0, 0.0, 0.0)) -> tuple[Body, ...]:
+    """Return the obstacles, seen from a point (3,) [m], in the shapes that distances are of.
 
     A half-space is a thin board at the part of its surface nearest the origin.
     """
     return tuple(
         _board(item) if isinstance(item.geometry, coal.Halfspace) else _body(item, OBSTACLE)
         for obstacle in scene
-        for item in geometry_objects(obstacle)
+        for item in geometry_objects(obstacle, origin=origin)
     )
 
 

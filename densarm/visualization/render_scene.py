@@ -1,6 +1,6 @@
 """RenderScene: all there is to see of a run, before anything draws it."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise, product
 
 import numpy as np
@@ -83,9 +83,10 @@ class RenderScene:
         rows = _key_rows(run)
         self.time, self.q = run.time[rows] - run.time[0], run.q[rows]
         nearest = map(World(task.arm, task.scene).nearest, self.q)
-        self.closest = [pair for pair in nearest if pair is not None]
+        origin = task.arm.origin
+        self.closest = [replace(pair, points=pair.points - origin) for pair in nearest if pair]
         self.robot = arm_bodies(task.arm)
-        self.obstacles = obstacle_bodies(task.scene)
+        self.obstacles = obstacle_bodies(task.scene, origin)
         self._solid = [body for body in self.obstacles if body.has_end]
         self.sensing_distance = task.margin + task.sensing.distance
         self.clearance = np.array([pair.distance for pair in self.closest])

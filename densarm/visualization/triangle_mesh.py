@@ -40,8 +40,9 @@ class TriangleMesh:
 def mesh_of(shape: coal.CollisionGeometry) -> TriangleMesh:
     """Return the surface of a shape: a mesh, box, sphere, capsule, cylinder or convex hull."""
     if isinstance(shape, coal.BVHModelBase):
-        triangles = map(shape.tri_indices, range(shape.num_tris))
-        return _smooth(np.array(shape.vertices()), _corners(triangles))
+        faces = _corners(map(shape.tri_indices, range(shape.num_tris)))
+        is_mirrored = shape.computeVolume() < 0.0
+        return _smooth(np.array(shape.vertices()), faces[:, ::-1] if is_mirrored else faces)
     if isinstance(shape, coal.Box):
         shape = box_hull(2.0 * shape.halfSide)
     elif isinstance(shape, coal.Cylinder):

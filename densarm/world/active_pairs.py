@@ -1,21 +1,19 @@
 """ActivePairs: the pairs of bodies that may be near, the only ones whose distances are queried."""
 
-import warnings
 from dataclasses import dataclass
 from typing import Any, Protocol
 
-import coal
 import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
+from densarm.arms.arm import Arm
 from densarm.arms.dynamics import Kinematics
-from densarm.arms.joint_space import joint_error
+from densarm.arms.joint_space import joint_error, sliding_joints
 from densarm.values.arrays import Array
 from densarm.values.kernels import compiled, compiled_part
-from densarm.world.distance_view import DistanceView
-from densarm.world.lipschitz import sliding_joints
-from densarm.world.world import COAL_TOLERANCE, DISTANCE_TOLERANCE, World
+from densarm.world.pair_queries import PairQueries
+from densarm.world.world import DISTANCE_TOLERANCE, World
 
 _ASLEEP, _AWAKE = 0, 1
 _NEVER = 0  # seen, of a pair that must be queried
@@ -104,9 +102,9 @@ class ActivePairs:
         self._updates_kinematics = kinematics is None
         self.kinematics = kinematics or Kinematics(arm)
         """Placements and Jacobian at the last update."""
-        self._geometry_data = self._precise_data()
-        self._view = DistanceView(self._geometry_data)
-        self.rows: Array = self._view.read()
+        self._queries = PairQueries(arm.model, self._geometry, world.pair_shapes, remembers=False)
+        self._geometry_data = self._queries.data
+        self.rows: Array = self._queries.rows
         """[distance, normal, point 1, point 2] (K, 10) [m]; old where a pair is asleep."""
         # Rows: awake, the version of `World.changes` that was queried, and a workspace.
         self._pair_states = np.array([[_AWAKE], [_NEVER], [0]]).repeat(world.n_pairs, axis=1)
@@ -117,11 +115,7 @@ class ActivePairs:
         self.reach: Array = self._pair_numbers[0]
         """Distance up to which each pair is awake (K,) [m], which may be changed in place."""
         self._bounds: Array | None = None
-        # Rows: the way gone, its last step, and the least and largest position of slides.
-        self._joint_numbers = np.zeros((4, arm.nv))
-        slides, rest = sliding_joints(arm.model), pin.neutral(arm.model)
-        self._joint_numbers[2] = np.where(slides, arm.limits.lower, -np.inf)
-        self._joint_numbers[3] = np.where(slides, arm.limits.upper, np.inf)
+        self._joint_numbers, rest = joint_numbers(arm), pin.neutral(arm.model)
         self._arrays: tuple[Any, ...] = (
             rest.copy(),
             arm.joint_index,
@@ -152,8 +146,7 @@ class ActivePairs:
         if not self.state.any():  # shapes were left where they were
             self._place_shapes(data)
         data.activateCollisionPair(pair)
-        pin.computeDistance(self._geometry, data, pair)
-        self._view.read()
+        self._queries.ask(np.array([pair]))
         self.state[pair] = _AWAKE
         self.distance[pair] = self.rows[pair, 0]
         return True
@@ -176,29 +169,18 @@ class ActivePairs:
             self.kinematics.update(q)
         if n_awake:
             self._place_shapes(data)
-            pin.computeDistances(self._geometry, data)
-            self._view.read()
+            self._queries.ask_active()
 
     def _place_shapes(self, data: pin.GeometryData) -> None:
         kinematics = self.kinematics
         pin.updateGeometryPlacements(kinematics.model, kinematics.data, self._geometry, data)
 
-    def _precise_data(self) -> pin.GeometryData:
-        """Return geometry data whose queries do not depend on those before, all made once."""
-        geometry = self._geometry
-        data = geometry.createData()
-        for item in geometry.geometryObjects:
-            item.geometry.computeLocalAABB()
-        with warnings.catch_warnings():
-            # Pinocchio asks for guesses from the last query, by a flag that coal calls deprecated.
-            warnings.simplefilter("ignore", DeprecationWarning)
-            for request in data.distanceRequests:
-                request.gjk_tolerance = request.epa_tolerance = COAL_TOLERANCE
-                request.enable_cached_gjk_guess = False
-                request.gjk_initial_guess = coal.GJKInitialGuess.BoundingVolumeGuess
-        self._place_shapes(data)
-        pin.computeDistances(geometry, data)
-        return data
+
+def joint_numbers(arm: Arm) -> Array:
+    """Return rows for `go` (4, nv): zeros, zeros, and the least and largest position of slides."""
+    slides, limits = sliding_joints(arm.model), arm.limits
+    low, high = np.where(slides, limits.lower, -np.inf), np.where(slides, limits.upper, np.inf)
+    return np.array([np.zeros(arm.nv), np.zeros(arm.nv), low, high])
 
 
 @compiled
@@ -229,7 +211,7 @@ def _wake(
     """
     reach, level = pair_numbers[0], pair_numbers[1]
     state, seen, changed = pair_states[0], pair_states[1], pair_states[2]
-    wakes_all = not _go(q, q_last, joint_index, joint_numbers)
+    wakes_all = not go(q, q_last, joint_index, joint_numbers)
     way, step = joint_numbers[0], joint_numbers[1]
     n_awake, n_changed = 0, 0
     for k in range(state.shape[0]):
@@ -237,9 +219,9 @@ def _wake(
         if change < 0:  # spare
             now, level[k] = _ASLEEP, np.inf
         elif change == seen[k] and not wakes_all:
-            gone = _motion(lipschitz, k, way)
+            gone = pair_motion(lipschitz, k, way)
             if before == _AWAKE:
-                level[k] = rows[k, 0] + (gone - _motion(lipschitz, k, step))
+                level[k] = rows[k, 0] + (gone - pair_motion(lipschitz, k, step))
             # A sleep of a few steps saves nothing, but pairs that close to their reach are few.
             if level[k] - gone > reach[k] + 2.0 * DISTANCE_TOLERANCE:
                 now = _ASLEEP
@@ -252,8 +234,16 @@ def _wake(
 
 
 @compiled_part
-def _go(q: Array, q_last: Array, joint_index: NDArray[np.int64], joint_numbers: Array) -> bool:
-    """Add the last step to the way gone; return whether bounds hold that are older than it."""
+def go(q: Array, q_last: Array, joint_index: NDArray[np.int64], joint_numbers: Array) -> bool:
+    """Add the last step to the way gone; return whether bounds hold that are older than it.
+
+    Args:
+        q: configuration (nq,).
+        q_last: the one before (nq,), overwritten.
+        joint_index: `Arm.joint_index` (2, nv).
+        joint_numbers: the way gone, its last step, both overwritten, and as `joint_numbers` has
+            them the least and largest position of slides (4, nv) [rad or m].
+    """
     way, step, low, high = joint_numbers[0], joint_numbers[1], joint_numbers[2], joint_numbers[3]
     joint_error(q_last, q, joint_index, step)
     holds = True
@@ -273,7 +263,8 @@ def _go(q: Array, q_last: Array, joint_index: NDArray[np.int64], joint_numbers: 
 
 
 @compiled_part
-def _motion(lipschitz: Array, pair: int, way: Array) -> float:
+def pair_motion(lipschitz: Array, pair: int, way: Array) -> float:
+    """Return how far a pair's bodies move against each other at most [m] on a way (nv,)."""
     motion = 0.0
     for j in range(way.shape[0]):
         motion += lipschitz[pair, j] * way[j]

@@ -14,13 +14,13 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
+from densarm.arms.joint_space import joint_axis
 from densarm.scene.shapes import box_hull, convex_hull, extreme_points
 from densarm.values.arrays import Array
 from densarm.values.kernels import compiled_part
-from densarm.world.lipschitz import joint_axis
 from densarm.world.world import World
 
-_WIDEST = 1e3  # [m]
+_WIDEST = 1e3  # [m], of the cube that stands for a half-space
 
 Integers = NDArray[np.int64]
 
@@ -80,7 +80,7 @@ def _bodies(world: World) -> tuple[Bodies, Integers]:
     middles = 0.5 * (low + high)
     centred = [each - middle for each, middle in zip(corners, middles, strict=True)]
     frames = [
-        _pose_row(item.placement * pin.SE3(np.eye(3), middle))
+        _pose_row(_pose(item) * pin.SE3(np.eye(3), middle))
         for item, middle in zip(shapes, middles, strict=True)
     ]
     reach = np.array([np.linalg.norm(each, axis=1).max() for each in centred]) + radius
@@ -109,12 +109,20 @@ def _bodies(world: World) -> tuple[Bodies, Integers]:
 
 
 def _hull(shape: coal.CollisionGeometry) -> coal.CollisionGeometry:
-    """Return a cube with a face on the surface of a half-space, wider than anything reaches."""
+    """Return a shape, or of a half-space a cube below the plane z = 0, wider than all reaches."""
     if not isinstance(shape, coal.Halfspace):
         return shape
-    turn = pin.Quaternion.FromTwoVectors(np.array([0.0, 0.0, 1.0]), shape.n).toRotationMatrix()
-    corners = np.array(box_hull([_WIDEST] * 3).points()) - [0.0, 0.0, 0.5 * _WIDEST]
-    return convex_hull(corners @ turn.T + shape.d * shape.n)
+    return convex_hull(np.array(box_hull([_WIDEST] * 3).points()) - [0.0, 0.0, 0.5 * _WIDEST])
+
+
+def _pose(item: pin.GeometryObject) -> pin.SE3:
+    """Return where a hull is: of a half-space with a face on its surface, below the origin."""
+    shape, pose = item.geometry, item.placement
+    if not isinstance(shape, coal.Halfspace):
+        return pose
+    normal = pose.rotation @ shape.n
+    turn = pin.Quaternion.FromTwoVectors(np.array([0.0, 0.0, 1.0]), normal).toRotationMatrix()
+    return pin.SE3(turn, (shape.d + normal @ pose.translation) * normal)
 
 
 def _edges(

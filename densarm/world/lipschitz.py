@@ -3,6 +3,7 @@
 import numpy as np
 import pinocchio as pin
 
+from densarm.arms.joint_space import joint_axis
 from densarm.scene.shapes import extreme_points
 from densarm.values.arrays import Array
 
@@ -14,21 +15,6 @@ def joint_support(model: pin.Model) -> Array:
         support[joint] = support[model.parents[joint]]
         support[joint, model.joints[joint].idx_v] = 1.0
     return support
-
-
-def joint_axis(model: pin.Model, joint: int) -> tuple[Array, bool]:
-    """Return the unit vector (3,) along which a joint slides or about which it turns; if it slides.
-
-    The joints of the model have one degree of freedom each.
-    """
-    subspace = model.joints[joint].createData().S.reshape(6)
-    slides = not subspace[3:].any()
-    return (subspace[:3] if slides else subspace[3:]), slides
-
-
-def sliding_joints(model: pin.Model) -> Array:
-    """Return which joints are prismatic (nv,), of a model of one degree of freedom a joint."""
-    return np.array([joint_axis(model, joint)[1] for joint in range(1, model.njoints)])
 
 
 def shape_lipschitz(model: pin.Model, shapes: pin.StdVec_GeometryObject) -> Array:

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from densarm.errors import InvalidValueError, SceneChangedError, UnknownNameError
 from densarm.scene.obstacles import Capsule, Obstacle, Sphere, obstacle_pose
 from densarm.scene.scene import Scene
+from densarm.values.arrays import Array
 
 
 class ChangingObstacles:
@@ -19,10 +20,15 @@ class ChangingObstacles:
         geometry_model: holds the obstacles' shapes last, in their order.
         pair_shapes: indices of the two shapes of each pair (K, 2).
         scene: the obstacles, all of them present.
+        origin: point of the world that is the origin of the geometry model (3,) [m].
     """
 
     def __init__(
-        self, geometry_model: pin.GeometryModel, pair_shapes: NDArray[np.int64], scene: Scene
+        self,
+        geometry_model: pin.GeometryModel,
+        pair_shapes: NDArray[np.int64],
+        scene: Scene,
+        origin: Array,
     ) -> None:
         self.geometry_model = geometry_model
         self.pair_shapes = pair_shapes
@@ -33,6 +39,7 @@ class ChangingObstacles:
         """For each pair, the `version` that its obstacle is of, negative if it is spare (K,)."""
         self._shapes = list(geometry_model.geometryObjects)
         self._attachments = scene.attachments
+        self._origin = origin
         self._spare: list[_Slot] = []
         self._present: dict[str, _Slot] = {}
         end = len(self._shapes) - sum(len(item.convex_shapes()) for item in scene)
@@ -174,7 +181,7 @@ class ChangingObstacles:
         self._fill(slot, obstacle)
 
     def _fill(self, slot: "_Slot", obstacle: Obstacle) -> None:
-        slot.hold(obstacle)
+        slot.hold(obstacle, self._origin)
         self._note(slot, 1)
 
     def _note(self, slot: "_Slot", sign: int) -> None:
@@ -201,14 +208,14 @@ class _Slot:
             getattr(obstacle, size) == getattr(self.obstacle, size) for size in sizes
         )
 
-    def hold(self, obstacle: Obstacle) -> None:
+    def hold(self, obstacle: Obstacle, origin: Array) -> None:
         self.obstacle = obstacle
         geometry = self.shapes[0].geometry
         if isinstance(obstacle, Sphere | Capsule):
             geometry.radius = obstacle.radius
         if isinstance(obstacle, Capsule):
             geometry.halfLength = 0.5 * obstacle.length
-        pose, one = obstacle_pose(obstacle), len(self.shapes) == 1
+        pose, one = obstacle_pose(obstacle, origin), len(self.shapes) == 1
         for k, shape in enumerate(self.shapes):
             shape.placement = pose
             shape.name = obstacle.name if one else f"{obstacle.name}.{k}"

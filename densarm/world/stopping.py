@@ -156,7 +156,7 @@ class StoppingCheck:
         duration = self._stopping.durations(q, v)
         travel = 0.5 * np.where(np.isfinite(duration), duration, 0.0)[:, np.newaxis] * v
         end = arm.angles(q) + travel
-        outside = np.maximum(limits.lower - end, end - limits.upper).max(axis=1)
+        outside = limits.excess(end).max(axis=1)
         inside = np.asarray(outside <= _ROUNDING)
         turns = np.cumsum(arm.difference(q[:-1], q[1:]), axis=0)
         angles = arm.angles(q[0]) + np.vstack([np.zeros(arm.nv), turns])

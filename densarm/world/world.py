@@ -2,7 +2,9 @@
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from itertools import product
 
+import coal
 import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
@@ -13,18 +15,18 @@ from densarm.scene.obstacles import Obstacle, geometry_objects
 from densarm.scene.scene import Scene
 from densarm.values.arrays import Array
 from densarm.values.documented import documented
-from densarm.world.distance_view import DistanceView, add_pair_gradients
+from densarm.world.distance_view import add_pair_gradients
 from densarm.world.lipschitz import joint_support, shape_lipschitz
 from densarm.world.obstacle_slots import ChangingObstacles
-
-COAL_TOLERANCE = 1e-10
-"""GJK and EPA tolerance [m]; at coal's default of 1e-6 gradients err by up to 4e-3."""
+from densarm.world.pair_queries import PairQueries
 
 DISTANCE_TOLERANCE = 1e-7
 """Bound on the error of a computed distance that certificates subtract [m].
 
 Above it the largest error measured, between hulls with faces nearly parallel, is 2e-8 m.
 """
+
+_OVERLAP = 5e-3  # [m], above which a base does not just stand on something; UR's meshes go 3 mm in
 
 Pairs = NDArray[np.int64]
 """Indices of pairs (P,)."""
@@ -86,13 +88,13 @@ class World(ChangingObstacles):
         reserve = Scene([*scene, *spare], scene.attachments)
         model = _geometry_model(arm, reserve)
         pair_shapes = [(pair.first, pair.second) for pair in model.collisionPairs]
-        super().__init__(model, np.array(pair_shapes, dtype=np.int64).reshape(-1, 2), reserve)
+        indices = np.array(pair_shapes, dtype=np.int64).reshape(-1, 2)
+        super().__init__(model, indices, reserve, arm.origin)
         self.n_pairs = len(pair_shapes)
-        self._geometry_data, self._data = model.createData(), arm.model.createData()
+        self._queries = PairQueries(arm.model, model, self.pair_shapes, remembers=True)
+        self._geometry_data, self._data = self._queries.data, arm.model.createData()
         # A view that follows the data; Pinocchio drops the second axis of a single column.
         self._jacobian = self._data.J.reshape(6, arm.nv)
-        for request in self._geometry_data.distanceRequests:
-            request.gjk_tolerance = request.epa_tolerance = COAL_TOLERANCE
         shapes = model.geometryObjects
         moves = joint_support(arm.model)[np.array([item.parentJoint for item in shapes], np.int64)]
         first, second = self.pair_shapes.T
@@ -107,10 +109,6 @@ class World(ChangingObstacles):
         r_kj bounds, over all configurations within the position limits, the distance from the axis
         of joint j to any point of the body that it moves; 0 where it moves both bodies or neither.
         """
-        pin.computeDistances(
-            arm.model, self._data, model, self._geometry_data, pin.neutral(arm.model)
-        )
-        self._view = DistanceView(self._geometry_data)
         for obstacle in reserve.obstacles[len(scene) :]:
             self.remove_obstacle(obstacle.name)
         self._is_spare, self._skipped = np.zeros(self.n_pairs, bool), 0
@@ -143,10 +141,23 @@ class World(ChangingObstacles):
         Returns:
             Distances (K,), or those of the pairs (P,) [m], in a new array.
         """
+        rows = self.query(q, pairs)
+        asked = slice(None) if pairs is None else pairs
+        return np.where(self._is_spare[asked], np.inf, rows[asked, 0])
+
+    def query(self, q: Array, pairs: Pairs | None = None) -> Array:
+        """Return what coal tells of pairs, without a copy and without checks.
+
+        Args:
+            q: configuration (nq,).
+            pairs: indices of the pairs to ask for; None for all.
+
+        Returns:
+            Rows [distance, normal from body 1 to 2, nearest point of each] of all pairs (K, 10),
+            new where asked for, points seen from `Arm.origin`; the next query overwrites them.
+        """
         pin.forwardKinematics(self.arm.model, self._data, q)
-        rows = self._measured(pairs)
-        distance = np.where(self._is_spare, np.inf, rows[:, 0])
-        return distance if pairs is None else distance[pairs]
+        return self._measured(pairs)
 
     def nearest(self, q: Array) -> NearestPair | None:
         """Return the nearest two bodies at a configuration (nq,), None without pairs."""
@@ -154,8 +165,12 @@ class World(ChangingObstacles):
         if not np.isfinite(distance).any():
             return None
         k = int(distance.argmin())
-        points = self._view.read()[k, 4:].reshape(2, 3).copy()
+        points = self._queries.rows[k, 4:].reshape(2, 3) + self.arm.origin
         return NearestPair(float(distance[k]), points, self.pairs[k])
+
+    def base_overlaps(self) -> tuple[str, ...]:
+        """Return what the function of this name does, of the obstacles as they are now."""
+        return base_overlaps(self.arm, self.scene)
 
     def motion_bound(self, step: Array, pairs: Pairs | None = None) -> Array:
         r"""Return how far the bodies of each pair move against each other at most [m].
@@ -179,11 +194,10 @@ class World(ChangingObstacles):
             self._skip_spare_pairs()
         pin.updateGeometryPlacements(self.arm.model, self._data, model, data)
         if pairs is not None and len(pairs) < self.n_pairs:
-            for k in pairs.tolist():
-                pin.computeDistance(model, data, k)
-        else:
-            pin.computeDistances(model, data)
-        return self._view.read()
+            self._queries.ask(pairs)
+        elif not self._is_spare.all():
+            self._queries.ask_active()
+        return self._queries.rows
 
     def _skip_spare_pairs(self) -> None:
         is_spare, self._skipped = self.changes < 0, self.version
@@ -193,6 +207,26 @@ class World(ChangingObstacles):
             else:
                 self._geometry_data.activateCollisionPair(k)
         self._is_spare = is_spare
+
+
+def base_overlaps(arm: Arm, scene: Scene) -> tuple[str, ...]:
+    """Return which obstacles an arm's base is more than 5 mm inside of, a phrase each.
+
+    The base is all that no joint moves. A world has no distance of it, since none would change: the
+    arm stands in its table, or one of the two is not where it is said to be.
+    """
+    still = [item for item in arm.collision_model.geometryObjects if not item.parentJoint]
+    around = [x for obstacle in scene for x in geometry_objects(obstacle, origin=arm.origin)]
+    found = []
+    for bodies in product(still, around):
+        poses = [coal.Transform3s(b.placement.rotation, b.placement.translation) for b in bodies]
+        first, second = zip((body.geometry for body in bodies), poses, strict=True)
+        # At coal's own tolerance of 1e-6 m: at tighter ones it may find no distance.
+        depth = -coal.distance(*first, *second, coal.DistanceRequest(), coal.DistanceResult())
+        if depth > _OVERLAP:
+            names = " is in ".join(repr(body.name) for body in bodies)
+            found.append(f"{names} by {1e3 * depth:.3g} mm")
+    return tuple(found)
 
 
 def _geometry_model(arm: Arm, scene: Scene) -> pin.GeometryModel:
@@ -206,7 +240,7 @@ def _geometry_model(arm: Arm, scene: Scene) -> pin.GeometryModel:
         for k, item in enumerate(model.geometryObjects)
         if item.parentJoint > 0 and item.name not in arm.self_pieces
     ]
-    for item in [item for obstacle in scene for item in geometry_objects(obstacle)]:
+    for item in [x for obstacle in scene for x in geometry_objects(obstacle, origin=arm.origin)]:
         if model.existGeometryName(item.name):
             allowed = f"other than the names of the shapes of {arm.name!r}"
             raise InvalidValueError("obstacle name", item.name, allowed)

@@ -38,6 +38,7 @@ def test_arms_that_people_have_are_known() -> None:
     assert known | {"two_link", "three_link"} <= set(robot_names())
 
 
+@pytest.mark.slow
 def test_postures_touch_nothing_and_are_within_limits(arm: Arm) -> None:
     assert "ready" in arm.postures
     clearance = World(arm, Scene([]))

@@ -1,5 +1,6 @@
 """What coal cannot differentiate becomes a shape around it, closely, or is refused by name."""
 
+from collections.abc import Callable
 from pathlib import Path
 
 import coal
@@ -140,20 +141,9 @@ def mesh_of(points: Array) -> coal.BVHModelOBBRSS:
     return mesh
 
 
-def excess(shape: coal.CollisionGeometry, points: Array) -> float:
-    """How far the farthest point is outside a shape [m]."""
-    pose, ball = coal.Transform3s(), coal.Sphere(1e-3)
-    request = coal.DistanceRequest(True)
-    request.gjk_tolerance = request.epa_tolerance = 1e-10
-    distances: list[float] = []
-    for point in points:
-        ball_pose = coal.Transform3s(np.eye(3), point)
-        result = coal.DistanceResult()
-        distances.append(coal.distance(shape, pose, ball, ball_pose, request, result) + 1e-3)
-    return max(distances)
-
-
-def test_mesh_becomes_its_hull(model: pin.Model) -> None:
+def test_mesh_becomes_its_hull(
+    model: pin.Model, excess: Callable[[coal.CollisionGeometry, Array], float]
+) -> None:
     points = np.random.default_rng(0).normal(size=(60, 3))
     result = differentiable_geometry(model, geometry_of(model, (mesh_of(points), at(1, 2, 3))))
     (item,) = result.geometryObjects

@@ -79,7 +79,7 @@ def test_earlier_records_keep_the_shapes_that_they_were_made_with() -> None:
 
 
 @pytest.mark.parametrize(
-    "change", [("wedge.obj", "gone.obj"), ('wedge.obj"', 'wedge.obj" scale="1 1 0"')]
+    "change", [("wedge.obj", "gone.obj"), ('wedge.obj"', 'wedge.obj" scale="1 1 1e9"')]
 )
 def test_a_visual_mesh_that_cannot_collide(change: tuple[str, str]) -> None:
     bad = replace(description(), urdf=TEXT.replace(*change))

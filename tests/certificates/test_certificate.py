@@ -1,5 +1,6 @@
 """Every part of a certificate fails the run that it is there to refuse, and that part alone."""
 
+import re
 from dataclasses import replace
 from typing import Any
 
@@ -220,3 +221,42 @@ def test_replay_of_a_run_by_velocity_checks_the_kinematics(velocity_run: Run, na
 def test_a_run_by_velocity_is_none_by_torque(velocity_run: Run) -> None:
     task = replace(velocity_run.task, input=Input.TORQUE)
     assert "replay" in failing(replace(velocity_run, task=task))
+
+
+def without_masses(run: Run, **changes: Any) -> Run:
+    """The run judged for an arm that is the same but for the masses of its links."""
+    description = run.task.arm.description
+    text = re.sub(r"(?s)<inertial>.*?</inertial>", "", description.urdf)
+    assert text != description.urdf
+    arm = type(run.task.arm)(replace(description, urdf=text))
+    assert arm.links_without_mass
+    return replace(run, task=replace(run.task, arm=arm, **changes))
+
+
+def test_a_run_by_velocity_of_an_arm_without_masses(velocity_run: Run) -> None:
+    run = without_masses(velocity_run)
+    assert failing(run) == set()
+    details = {check.name: check.detail for check in run.certificate.checks}
+    assert details["limits"].endswith("torque limits do not apply")
+    assert details["stopping"].endswith("by acceleration limits alone")
+    limits = velocity_run.certificate.checks[PARTS.index("limits")]
+    assert limits.detail.endswith("torque limits do not apply")
+    stopping = velocity_run.certificate.checks[PARTS.index("stopping")]
+    assert "acceleration limits" not in stopping.detail
+
+
+def test_what_fails_without_masses_too(velocity_run: Run) -> None:
+    assert failing(without_masses(tampered(velocity_run, "v", 5, 0, 1.0))) >= {"limits", "replay"}
+    run, arm = without_masses(velocity_run), velocity_run.task.arm
+    absolute = np.cumsum(arm.angles(run.q[len(run.q) // 2]))
+    tip = (np.sin(absolute).sum(), 0.0, -np.cos(absolute).sum())
+    blocked = Scene([*run.task.scene, Sphere(name="late", radius=0.01, position=tip)])
+    assert failing(replace(run, task=replace(run.task, scene=blocked))) == {"swept", "stopping"}
+
+
+def test_torque_proves_nothing_without_masses(velocity_run: Run, swing_up_run: Run) -> None:
+    for run in (swing_up_run, velocity_run):
+        judged = without_masses(run, input=Input.TORQUE)
+        assert failing(judged) == {"replay"}
+        replay = judged.certificate.checks[PARTS.index("replay")]
+        assert replay.detail.endswith("no mass of upper_link, lower_link")

@@ -86,6 +86,7 @@ def test_ctrl_c_while_saving(
     assert list(tmp_path.iterdir()) == [path]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("option", "name", "writer"),
     [

@@ -3,6 +3,7 @@
 import json
 import os
 import pty
+import re
 import subprocess
 import sys
 from collections.abc import Callable
@@ -121,6 +122,30 @@ def test_start_in_contact_is_infeasible_and_names_the_pair(
     assert len(Run.load(tmp_path / "run.npz").time) == 1
 
 
+WEDGE = """
+[[obstacles]]
+type = "mesh"
+name = "wedge"
+path = "{path}"
+scale = [{scale}, {scale}, {scale}]
+position = [{x}, -0.05, -1.0]
+"""
+
+
+def test_a_mesh_in_centimetres_is_hit_where_it_is_in_metres(
+    command: Command, scenario_file: Callable[..., Path]
+) -> None:
+    """In metres without its unit its hull begins at the same corner and is 100 times as large."""
+    path = Path(__file__).parents[1] / "data" / "meshes" / "wedge_cm.dae"
+    hit = command("run", scenario_file(rest=WEDGE.format(path=path, scale=1.0, x=-0.05)))
+    assert (hit.status, "infeasible: " in hit.out, "wedge" in hit.out) == (1, True, True)
+    assert "large meshes" not in hit.out
+    past = command("run", scenario_file(rest=WEDGE.format(path=path, scale=1.0, x=0.5)))
+    assert past.status == 0
+    far = command("run", scenario_file(rest=WEDGE.format(path=path, scale=100.0, x=0.5)))
+    assert "large meshes      wedge 30 m: is their unit right?\n" in far.out
+
+
 def test_goal_outside_the_limits_is_infeasible_and_names_the_joint(
     command: Command, scenario_file: Callable[..., Path]
 ) -> None:
@@ -182,3 +207,21 @@ def test_compiling_is_shown_on_a_terminal(scenario_file: Callable[..., Path]) ->
     os.close(theirs)
     os.close(ours)
     assert process.returncode == 0
+
+
+def test_what_was_read_otherwise_and_what_is_not_checked_is_told(
+    command: Command, scenario_file: Callable[..., Path], tmp_path: Path
+) -> None:
+    """A link without size, and a table through the base, in one line each."""
+    urdf = (Path(__file__).parents[1] / "data" / "branching.urdf").read_text(encoding="utf-8")
+    urdf = re.sub(r'<mesh filename="[^"]*"[^>]*/>', '<box size="0.2 0.2 0.2"/>', urdf)
+    urdf = urdf.replace('<sphere radius="0.07"/>', '<sphere radius="0"/>')
+    (tmp_path / "robot.urdf").write_text(urdf, encoding="utf-8")
+    table = 'type = "box"\nname = "table"\nsize = [2.0, 2.0, 0.1]\nposition = [0.0, 0.0, -0.04]'
+    far = "start = [9.0, 0.0, 0.0, 0.0, 0.0]\ngoal = [0.0, 0.0, 0.0, 0.0, 0.0]"
+    path = scenario_file('urdf = "robot.urdf"', far, f"[[obstacles]]\n{table}")
+    done = command("run", path, "--save", tmp_path / "run.npz")
+    assert "collision sphere of link 'right_arm' has no size: left out\n" in done.out
+    assert re.search(r"not checked +'base_0' is in 'table' by \d+ mm: neither moves\n", done.out)
+    (overlap,) = Run.load(tmp_path / "run.npz").base_overlaps
+    assert overlap.startswith("'base_0' is in 'table' by ")

@@ -5,6 +5,8 @@ from typing import Any
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from densarm.arms.arm import Arm
 from densarm.control.controller import Gains
@@ -197,3 +199,45 @@ def test_it_knows_its_motion_goal_and_error(swing_up: Scenario, swing_up_motion:
     assert np.abs(swing_up.arm.difference(controller.goal, swing_up.goal)).max() < 1e-9
     controller.torque(0.0, swing_up.arm.integrate(swing_up.start, np.array([0.1, -0.2])), [0, 0])
     assert controller.tracking_error == pytest.approx(0.2)
+
+
+# Told as velocities.
+
+
+@pytest.fixture(scope="module")
+def swing_up_tracking(swing_up: Scenario, swing_up_motion: Motion) -> DensityTracking:
+    return DensityTracking(swing_up.world, swing_up_motion)
+
+
+@given(
+    t=st.floats(-0.1, 3.0),
+    off=st.lists(st.floats(-0.3, 0.3), min_size=2, max_size=2),
+    shares=st.lists(st.floats(-1.0, 1.0), min_size=2, max_size=2),
+)
+def test_commanded_velocity_keeps_the_limits_wherever_the_arm_is(
+    swing_up: Scenario,
+    swing_up_tracking: DensityTracking,
+    t: float,
+    off: list[float],
+    shares: list[float],
+) -> None:
+    arm, motion = swing_up.arm, swing_up_tracking.motion
+    v = np.array(shares) * arm.limits.velocity
+    q = arm.integrate(arm.configuration(motion.sample(t).position), np.array(off))
+    told = swing_up_tracking.velocity(t, q, v)
+    assert (np.abs(told) <= arm.limits.velocity).all()
+    assert (np.abs(told - v) <= motion.period * arm.limits.acceleration).all()
+
+
+def test_commanded_velocity_follows_the_motion_and_comes_back_to_it(
+    swing_up: Scenario, swing_up_tracking: DensityTracking
+) -> None:
+    """With a law of ė = -(K_p/K_v) e near it, an error falls to a hundredth in half a second."""
+    arm, controller, motion = swing_up.arm, swing_up_tracking, swing_up_tracking.motion
+    for off, bound in ((0.0, 1e-12), (0.01, 1.1e-4)):
+        q, v = arm.integrate(arm.configuration(motion.position[0]), np.full(2, off)), np.zeros(2)
+        for k in range(500):
+            v = controller.velocity(k * motion.period, q, v)
+            q = arm.integrate(q, motion.period * v)
+        error = arm.difference(arm.configuration(motion.position[500]), q)
+        assert np.abs(error).max() <= bound

@@ -2,24 +2,13 @@
 
 from collections.abc import Callable, Sequence
 from functools import cache
-from typing import Any
 
 import numpy as np
 import pytest
 
 from densarm.arms.arm import Arm
 from densarm.arms.description import RobotDescription
-from densarm.density.goal_distance import TorusDistance
-from densarm.density.navigation_density import DensityParameters
-from densarm.density.sub_goals import GuidedDensity, GuidePath, SubGoals
-from densarm.density.unsafe_sets import SensingParameters
-from densarm.planning.guide import NoPath
-from densarm.planning.path_guide import PathGuide
-from densarm.scenarios.scenario import Scenario
-from densarm.scene.scene import Scene
 from densarm.values.arrays import Array
-from densarm.world.swept_check import SweptCheck
-from densarm.world.world import World
 
 NO_LIMIT = 1e15  # [m], which an arm takes for none
 KINDS = {"b": "prismatic", "c": "continuous"}
@@ -101,31 +90,3 @@ def disc() -> tuple[Callable[[Array], tuple[float, Array]], Callable[[Array], tu
         return lambda x: (float(x @ x - offset), 2.0 * x)
 
     return squared_radius(1.0), squared_radius(4.0)
-
-
-@pytest.fixture(scope="session")
-def make_guided(swing_up: Scenario) -> Callable[..., GuidedDensity]:
-    """Return a maker of guided densities in swing_up: by guide, start, goal and parameters."""
-
-    def make(
-        guide: str = "path",
-        start: Sequence[float] | None = None,
-        goal: Sequence[float] | None = None,
-        scene: Scene | None = None,
-        margin: float = 0.0,
-        **parameters: Any,
-    ) -> GuidedDensity:
-        arm = swing_up.arm
-        check = SweptCheck(World(arm, swing_up.scene if scene is None else scene), margin)
-        ends = (
-            swing_up.start if start is None else arm.configuration(start),
-            swing_up.goal if goal is None else arm.configuration(goal),
-        )
-        path: GuidePath | NoPath = GuidePath(np.stack(ends), is_clear=False)
-        if guide != "direct":
-            path = PathGuide(arm, check).plan(*ends, 0)
-        assert isinstance(path, GuidePath)
-        goals = SubGoals(check, path, SensingParameters())
-        return GuidedDensity(check, goals, TorusDistance(arm), DensityParameters(**parameters))
-
-    return make

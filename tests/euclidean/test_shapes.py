@@ -67,12 +67,14 @@ def assert_gradient_is_the_derivative(shape: ImplicitFunction, x: Array) -> None
     np.testing.assert_allclose(shape.gradient(x), numerical, atol=1e-7 * scale)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("shape", PLANE, ids=repr)
 @given(x=points(2))
 def test_gradient_is_the_derivative_in_the_plane(shape: ImplicitFunction, x: Array) -> None:
     assert_gradient_is_the_derivative(shape, x)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("shape", SPACE, ids=repr)
 @given(x=points(3))
 def test_gradient_is_the_derivative_in_space(shape: ImplicitFunction, x: Array) -> None:

@@ -1,26 +1,17 @@
 """Discs in the joint space of two-joint arms, and the two-link arm between its two balls."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 import pytest
 
 from densarm.arms.arm import Arm
 from densarm.arms.description import RobotDescription
-from densarm.density.goal_distance import TorusDistance
-from densarm.density.navigation_density import DensityParameters
-from densarm.density.sub_goals import GuidedDensity, GuidePath, SubGoals
-from densarm.density.unsafe_sets import SensingParameters
-from densarm.planning.guide import NoPath
-from densarm.planning.path_guide import PathGuide
 from densarm.scenarios.scenario import Scenario
-from densarm.scene.scene import Scene
 from densarm.values.arrays import Array
 from densarm.world.swept_check import SweptCheck
-from densarm.world.world import World
 
 BOUND = 3.0  # [m]
 
@@ -148,30 +139,3 @@ def curve(check: SweptCheck) -> Array:
     """Return a polyline with corners, over the back of a continuous joint."""
     corners = np.array([[2.8, 0.0], [3.4, 0.9], [4.0, 0.6], [3.6, -0.4]])
     return check.arm.configurations(corners)
-
-
-@pytest.fixture(scope="session")
-def make_guided(swing_up: Scenario) -> Callable[..., GuidedDensity]:
-    """Return a maker of guided densities in swing_up: by guide, start, goal and parameters."""
-
-    def make(
-        guide: str = "path",
-        start: Sequence[float] | None = None,
-        goal: Sequence[float] | None = None,
-        scene: Scene | None = None,
-        **parameters: Any,
-    ) -> GuidedDensity:
-        arm = swing_up.arm
-        check = SweptCheck(World(arm, swing_up.scene if scene is None else scene))
-        ends = (
-            swing_up.start if start is None else arm.configuration(start),
-            swing_up.goal if goal is None else arm.configuration(goal),
-        )
-        path: GuidePath | NoPath = GuidePath(np.stack(ends), is_clear=False)
-        if guide != "direct":
-            path = PathGuide(arm, check).plan(*ends, 0)
-        assert isinstance(path, GuidePath)
-        goals = SubGoals(check, path, SensingParameters())
-        return GuidedDensity(check, goals, TorusDistance(arm), DensityParameters(**parameters))
-
-    return make

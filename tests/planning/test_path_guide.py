@@ -13,6 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from densarm.arms.arm import Arm, load_arm
+from densarm.arms.joints import POSITION_TOLERANCE
 from densarm.errors import InvalidValueError
 from densarm.planning.guide import FreeSpace, GuidePath, NoPath
 from densarm.planning.path_guide import PathGuide, PathGuideParameters, shortcut
@@ -232,6 +233,17 @@ def test_an_end_outside_limits_is_named(make_arm: Callable[..., Arm], make_discs
     guide = PathGuide(arm, make_discs(arm))
     answer = guide.plan(arm.configuration([0.0, 0.0]), arm.configuration([3.1, 0.0]), 0)
     assert answer == NoPath("the goal is outside the position limits of first")
+
+
+def test_an_end_may_exceed_limits_by_the_tolerance(
+    make_arm: Callable[..., Arm], make_discs: Discs
+) -> None:
+    arm = make_arm("revolute", "revolute")
+    over = arm.limits.upper[1] + 0.9 * POSITION_TOLERANCE
+    wall = make_discs(arm, (0.0, 0.0, 0.6))
+    start, goal = arm.configuration([-1.5, over]), arm.configuration([1.5, -over])
+    path = path_of(PathGuide(arm, wall).plan(start, goal, 0))
+    np.testing.assert_array_equal(path[[0, -1]], [start, goal])
 
 
 def test_ends_on_the_limits_and_on_the_seam_are_allowed(

@@ -10,19 +10,22 @@ import pytest
 
 from densarm.arms.arm import Arm
 from densarm.arms.free_body import free_body
+from densarm.arms.joints import POSITION_TOLERANCE
+from densarm.control.tracking import DensityTracking
 from densarm.density.goal_distance import TorusDistance
 from densarm.density.navigation_density import DensityParameters
 from densarm.density.sub_goals import GuidedDensity, SubGoals
 from densarm.density.unsafe_sets import SensingParameters
 from densarm.errors import InvalidValueError
-from densarm.planning.guide import GuidePath, NoPath
+from densarm.planning.guide import FreeSpace, GuidePath, NoPath
 from densarm.planning.integral_curve import IntegralCurve, integral_curve
 from densarm.planning.motion import Motion, PlanningError, TimingParameters
-from densarm.planning.path_guide import PathGuideParameters
+from densarm.planning.path_guide import PathGuide, PathGuideParameters
 from densarm.planning.plan import PATH_MARGIN, PLANNING_ALPHA, plan_motion, plan_path
 from densarm.scenarios.scenario import Scenario, load_scenario
 from densarm.scene.obstacles import Box, Obstacle, Sphere
 from densarm.scene.scene import Scene
+from densarm.simulation.simulate import simulate
 from densarm.values.arrays import Array
 from densarm.values.outcome import Outcome
 from densarm.world.stopping import StoppingCheck, StoppingTrajectory
@@ -101,6 +104,22 @@ def test_goal_out_of_reach_is_no_path(fenced_in: Scenario) -> None:
     assert error.motion is None
 
 
+def test_half_of_the_searches_are_made_under_all_margins_but_the_last(
+    fenced_in: Scenario, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    made: list[tuple[int, int]] = []
+
+    class Watched(PathGuide):
+        def __init__(self, arm: Arm, freedom: FreeSpace, parameters: PathGuideParameters) -> None:
+            made.append((parameters.iterations, parameters.searches))
+            super().__init__(arm, freedom, parameters)
+
+    monkeypatch.setattr("densarm.planning.plan.PathGuide", Watched)
+    search = PathGuideParameters(iterations=100, searches=3)
+    why_not(fenced_in.world, fenced_in.start, fenced_in.goal, search=search)
+    assert made == [(2, 1), (100, 2), (100, 3)]
+
+
 @pytest.fixture(scope="module")
 def panda() -> Scenario:
     return load_scenario("panda_table")
@@ -115,8 +134,18 @@ def test_ends_in_contact_and_outside_limits_are_told_at_once(panda: Scenario) ->
     assert error.outcome == Outcome.INFEASIBLE
     assert error.detail.startswith("start: panda_")
     assert " and ball overlap by " in error.detail
-    assert "goal: joint 'panda_joint4' at 0.5 is outside [-3.072, -0.0698]" in error.detail
+    assert "goal: joint 'panda_joint4' at 0.5 is outside [-3.0718, -0.0698]" in error.detail
     assert error.motion is None
+
+
+@pytest.mark.parametrize("guide", ["path", "direct"])
+@pytest.mark.parametrize("backwards", [False, True])
+def test_ends_at_the_limits_may_be_rounded(panda: Scenario, guide: str, backwards: bool) -> None:
+    world, goal = panda.world, panda.goal.copy()
+    goal[0] = panda.arm.limits.upper[0] + 0.9 * POSITION_TOLERANCE
+    start, goal = (goal, panda.start) if backwards else (panda.start, goal)
+    motion = plan_motion(world, start, goal, guide=guide)
+    assert simulate(world, DensityTracking(world, motion), start).certified
 
 
 def test_inside_the_margin_is_infeasible(swing_up: Scenario) -> None:

@@ -1,10 +1,18 @@
 """Timing: rest to rest, within every limit's share, or an error that says why not."""
 
+import re
+from functools import cache
+from pathlib import Path
+
 import numpy as np
 import pinocchio as pin
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from densarm.arms.arm import Arm, load_arm
+from densarm.arms.catalogue import robot_names
+from densarm.arms.description import RobotDescription
 from densarm.errors import InvalidValueError
 from densarm.planning.motion import Motion, PlanningError, TimingParameters
 from densarm.planning.smoothing import SmoothPath, smooth_path
@@ -15,6 +23,7 @@ from densarm.values.outcome import Outcome
 from densarm.world.stopping import StoppingCheck, StoppingTrajectory
 from densarm.world.world import World
 
+GANTRY = Path(__file__).parents[1] / "data" / "gantry.urdf"
 PERIOD = 0.001  # [s]
 EXCESS = 1.02  # limits hold at grid points; between them the excess is this small
 
@@ -79,6 +88,73 @@ def test_an_arm_too_weak_to_hold_itself(timed: Timed) -> None:
     with pytest.raises(PlanningError, match=message) as raised:
         time_path(arm, path, 3.0, PERIOD, TimingParameters(torque_share=0.01))
     assert raised.value.outcome == Outcome.INFEASIBLE
+
+
+def test_what_is_unlimited_may_be_heavy() -> None:
+    """A slide that lifts five tons takes 49 kN, which the solver has no number for."""
+    text = re.sub('effort="[0-9]*"', 'effort="0"', GANTRY.read_text())
+    text = text.replace('<mass value="2"/>', '<mass value="5000"/>')
+    arm = Arm(RobotDescription(name="crane", urdf=text))
+    path = free_path(arm, [[0.0, 0.0, 0.1], [0.5, 0.2, 0.4]])
+    motion = time_path(arm, path, 0.7, PERIOD, TimingParameters())
+    peak = np.abs(np.diff(motion.velocity, axis=0)).max() / PERIOD / arm.limits.acceleration[0]
+    assert 0.8 < peak <= TimingParameters().acceleration_share
+
+
+def test_a_motion_where_topp_ra_fails(timed: Timed, monkeypatch: pytest.MonkeyPatch) -> None:
+    arm, path, best = timed
+    failed = lambda *_: (None, None, None)  # noqa: E731
+    monkeypatch.setattr("toppra.algorithm.TOPPRA.compute_parameterization", failed)
+    slower = time_path(arm, path, 3.0, PERIOD, TimingParameters())
+    assert 0.9 * best.duration < slower.duration < 2.5 * best.duration
+    with pytest.raises(PlanningError, match="torque limits allow no motion"):
+        time_path(arm, path, 3.0, PERIOD, TimingParameters(torque_share=0.01))
+
+
+known_arm = cache(load_arm)
+
+
+@pytest.mark.slow
+@settings(max_examples=100, deadline=None)
+@given(
+    name=st.sampled_from(robot_names()),
+    exponent=st.floats(-7.0, -1.0),
+    direction=st.lists(st.sampled_from([-1.0, -0.3, 0.0, 0.0, 1.0]), min_size=9, max_size=9),
+)
+def test_the_shortest_ways_are_timed_within_the_limits(
+    name: str, exponent: float, direction: list[float]
+) -> None:
+    arm = known_arm(name)
+    middle = arm.angles(arm.postures["neutral"])
+    step = 10.0**exponent * (np.array(direction[: arm.nv]) + np.eye(arm.nv)[0] * 0.1)
+    path = SmoothPath(
+        np.repeat([0.0, 1.0], 4), middle + np.linspace(0.0, 1.0, 4)[:, np.newaxis] * step
+    )
+    motion = time_path(arm, path, float(np.linalg.norm(step)), PERIOD, TimingParameters())
+    np.testing.assert_allclose(motion.position[[0, -1]], [middle, middle + step], atol=1e-15)
+    acceleration = np.abs(np.diff(motion.velocity, axis=0)).max(axis=0) / PERIOD
+    assert (acceleration <= arm.limits.acceleration).all()
+    assert (np.abs(motion.velocity) <= arm.limits.velocity).all()
+    least = 2.0 * np.sqrt(np.abs(step) / arm.limits.acceleration).max()
+    assert motion.duration <= 3.0 * least + 3.0 * PERIOD
+
+
+@pytest.mark.parametrize(
+    ("scale", "limit", "message"),
+    [
+        (1e-6, 60.0, r"takes .*e\+05 s, more than time_limit = 60 s: .* joint '.*', which alone"),
+        (1e-6, np.inf, "more than 1000000 periods of 0.001 s"),
+        (1.0, 0.5, "more than time_limit = 0.5 s"),
+    ],
+)
+def test_a_motion_too_long_is_refused_before_it_is_made(
+    timed: Timed, scale: float, limit: float, message: str
+) -> None:
+    arm, path, _ = timed
+    slow = TimingParameters(velocity_share=scale)
+    with pytest.raises(PlanningError, match=message) as raised:
+        time_path(arm, path, 3.0, PERIOD, slow, time_limit=limit)
+    assert raised.value.outcome == Outcome.TIMED_OUT
 
 
 @pytest.fixture(scope="module")

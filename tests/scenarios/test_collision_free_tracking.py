@@ -21,10 +21,11 @@ pytestmark = pytest.mark.slow
 
 SCENARIOS = ["swing_up", "panda_table", "panda_shelf"]
 TRACKING_ERROR = 0.005  # [rad]
+REGULATIONS = (ControlForm.REGULATION, ControlForm.PLAIN)
 
 # The feedback at full rate is the one of the scenario files; slower rates are as certified and
 # simulate faster.
-DIVISOR = {ControlForm.TRACKING: 1, ControlForm.REGULATION: 5, ControlForm.PLAIN: 5}
+DIVISOR = dict.fromkeys(ControlForm, 1) | dict.fromkeys(REGULATIONS, 5)
 CASES = list(product(SCENARIOS, ControlForm))
 JERK_TIME = 0.025  # [s], 1 / K_v
 
@@ -50,9 +51,7 @@ def test_reaches_and_is_certified(name: str, form: ControlForm) -> None:
     assert [check for check in done.certificate.checks if not check.holds] == []
 
 
-@pytest.mark.parametrize(
-    ("name", "form"), [case for case in CASES if case[1] != ControlForm.TRACKING]
-)
+@pytest.mark.parametrize(("name", "form"), list(product(SCENARIOS, REGULATIONS)))
 def test_regulation_neither_jolts_nor_chatters(name: str, form: ControlForm) -> None:
     done = run_of(name, form)
     task = done.task
@@ -74,7 +73,7 @@ def test_tracks_its_motion(name: str) -> None:
     assert error <= TRACKING_ERROR
 
 
-@pytest.mark.parametrize("form", [ControlForm.REGULATION, ControlForm.PLAIN])
+@pytest.mark.parametrize("form", REGULATIONS)
 def test_other_forms_have_no_motion_to_track(form: ControlForm) -> None:
     assert run_of("swing_up", form).tracking_error is None
 

@@ -1,6 +1,7 @@
 """Runs of scenarios: outcomes that say why, the same bits for the same scenario and seed."""
 
 import hashlib
+import re
 import subprocess
 import sys
 from collections.abc import Callable
@@ -97,10 +98,26 @@ def test_regulation_in_the_other_gauges_reaches_by_the_blend(
 
 def test_timed_out(swing_up: Scenario) -> None:
     hurried = replace(swing_up, simulation=replace(swing_up.simulation, time_limit=0.5))
-    done = run(hurried)
+    done = run(formed(hurried, "regulation"))
     assert done.outcome == Outcome.TIMED_OUT
     assert done.time[-1] == pytest.approx(0.5)
     assert done.detail == "after 0.5 s"
+
+
+def test_a_motion_longer_than_the_time_limit_is_not_begun(swing_up: Scenario) -> None:
+    hurried = replace(swing_up, simulation=replace(swing_up.simulation, time_limit=0.5))
+    done = run(hurried)
+    assert done.outcome == Outcome.TIMED_OUT
+    assert len(done.time) == 1
+    assert re.search(r"the motion takes 1\.\d+ s, more than time_limit = 0\.5 s", done.detail)
+
+
+@pytest.mark.parametrize("distance", [1e-9, 1e-5, 4e-4])
+def test_almost_at_the_goal(swing_up: Scenario, distance: float) -> None:
+    goal = swing_up.arm.integrate(swing_up.start, np.array([distance, 0.0]))
+    done = run(replace(swing_up, goal=goal))
+    assert done.outcome == Outcome.REACHED
+    assert done.certified
 
 
 def test_goal_at_the_start_is_reached_at_once(swing_up: Scenario) -> None:
@@ -135,7 +152,7 @@ def test_infeasible_start_and_goal_name_pairs_depths_joints_and_limits(
     assert "start: panda_" in done.detail
     assert " and ball overlap by " in done.detail
     assert " mm" in done.detail
-    assert "goal: joint 'panda_joint4' at 0.5 is outside [-3.072, -0.0698]" in done.detail
+    assert "goal: joint 'panda_joint4' at 0.5 is outside [-3.0718, -0.0698]" in done.detail
     assert done.plan_time == done.preparation_time == 0.0
     assert len(done.q) == 1
     assert not done.certified

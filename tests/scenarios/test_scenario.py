@@ -348,3 +348,22 @@ def test_scene_of_a_scenario_may_be_replaced() -> None:
     scenario = load_scenario("swing_up")
     assert scenario.world.n_pairs > 0
     assert replace(scenario, scene=Scene()).world.n_pairs == 0
+
+
+def test_degrees_are_asked_about(tmp_path: Path) -> None:
+    degrees, ready = "[-68.7, -45, 0, -135, 0, 90, 45]", '"ready"'
+    robot = '[robot]\nname = "panda"\n[task]\n'
+    message = r"task.start = .*: must be in radians, -2.897 to 2.897 for 'panda_joint1', not -68.7"
+    with pytest.raises(FileContentError, match=rf"{message}: are these degrees\?"):
+        loaded(tmp_path, f"{robot}start = {degrees}\ngoal = {ready}\n")
+    with pytest.raises(FileContentError, match=r"task.goal = .* are these degrees"):
+        loaded(tmp_path, f"{robot}start = {ready}\ngoal = {degrees}\n")
+
+
+def test_many_turns_of_a_continuous_joint_are_no_degrees(tmp_path: Path) -> None:
+    assert loaded(tmp_path, BASE.replace("[1.0, 0.5]", "[90.0, 0.5]")).arm.continuous[0]
+
+
+def test_positions_just_outside_the_limits_are_left_to_the_planner(tmp_path: Path) -> None:
+    robot = '[robot]\nname = "panda"\n[task]\nstart = "ready"\n'
+    loaded(tmp_path, f"{robot}goal = [0, 0, 0, 6.0, 0, 1, 0]\n")

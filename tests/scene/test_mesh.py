@@ -45,7 +45,7 @@ def rounded(mesh: Mesh) -> set[tuple[float, ...]]:
     return {tuple(np.round(corner, 6).tolist()) for corner in corners}
 
 
-@pytest.mark.parametrize("name", ["wedge.stl", "wedge.obj"])
+@pytest.mark.parametrize("name", ["wedge.stl", "wedge.obj", "wedge_cm.dae"])
 def test_hull_of_a_file(name: str) -> None:
     assert rounded(Mesh(name="wedge", path=MESHES / name)) == WEDGE
     scaled = Mesh(name="wedge", path=str(MESHES / name), scale=(1, 2, 0.5))
@@ -90,6 +90,16 @@ def test_faces_may_all_point_inwards(ell: Mesh, tmp_path: Path) -> None:
     assert volumes[1] == pytest.approx(volumes[0], rel=1e-3)
 
 
+def test_a_negative_scale_mirrors(ell: Mesh) -> None:
+    mirrored = Mesh(name="ell", path=ell.path, scale=(1, -1, 1), convex="pieces")
+    assert depth(mirrored, (0.5, -1.5, 0.5)) == pytest.approx(depth(ell, (0.5, 1.5, 0.5)), abs=2e-3)
+    assert depth(mirrored, (1.5, -1.5, 0.5)) < -0.45
+    hull = Mesh(name="wedge", path=MESHES / "wedge.stl", scale=(1, 1, -2))
+    assert rounded(hull) == {(x, y, -2 * z + 0.0) for x, y, z in WEDGE}
+    (shape,) = hull.convex_shapes()
+    assert shape.computeVolume() == pytest.approx(2 * 0.3 * 0.2 * 0.15 / 6)
+
+
 def depth(mesh: Mesh, point: Vector) -> float:
     """How far a point lies inside the piece that it is deepest in [m]."""
     request = coal.DistanceRequest(True, True)
@@ -132,7 +142,7 @@ def test_relative_path_starts_from_the_given_folder() -> None:
     [
         ({}, "m.path = '': must be the path of a mesh file"),
         ({"path": "x.stl", "convex": "both"}, "m.convex = 'both': must be one of hull, pieces"),
-        ({"path": "x.stl", "scale": (1, 0, 1)}, "m.scale = 0.0: must be a finite number > 0"),
+        ({"path": "x.stl", "scale": (1, 0, 1)}, "m.scale = .*must be three numbers other than 0"),
         ({"path": "x.stl", "scale": 2.0}, r"m.scale = 2.0: must be of shape \(3,\)"),
         ({"pieces": [[[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0]]]}, "m.pieces = .*with a volume"),
         ({"pieces": [[]]}, "m.pieces = .*with a volume"),
@@ -151,9 +161,13 @@ def test_wrong_meshes(fields: dict[str, Any], message: str) -> None:
     [
         ("none.stl", None, "No such file"),
         ("text.stl", b"no mesh\n", "not a mesh in STL, OBJ or DAE"),
-        ("text.xyz", b"no mesh\n", "not a mesh in STL, OBJ or DAE"),
-        ("flat.obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", "the mesh has no convex hull"),
-        ("far.obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1e9\nf 1 2 3\nf 1 2 4\n", "1000 km"),
+        ("text.glb", b"no mesh\n", "not a mesh in STL, OBJ or DAE, by its suffix"),
+        (
+            "flat.obj",
+            b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n",
+            "mesh of obstacle 'm' has no convex hull",
+        ),
+        ("far.obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1e9\nf 1 2 3\nf 1 2 4\n", "beyond 1 km"),
         ("no\0name.stl", None, "no such file"),
     ],
 )

@@ -203,6 +203,7 @@ TREE = st.recursive(
 )
 
 
+@pytest.mark.slow
 @settings(max_examples=75)
 @given(data=st.data(), junk=TREE)
 def test_wrong_values_raise_nothing_else(folder: Path, data: st.DataObject, junk: Any) -> None:
@@ -260,6 +261,16 @@ def test_wrong_files(tmp_path: Path, old: str, new: str, message: str) -> None:
         ("link_name: hand", "link_name: {}", "link_name of an attached object = {"),
         ("link_name: hand", "link_name: arm", "frame_id of an attached object = 'hand': must be"),
         ("weight: 0.5", "weight: -1", "bar.mass = -1.0: must be a finite number >= 0"),
+        (
+            "world:",
+            "link_padding: [{link_name: a, padding: 0}, {link_name: hand, padding: 0.01}]\nworld:",
+            "link_padding of 'hand' = 0.01: must be 0: set control.margin",
+        ),
+        (
+            "world:",
+            "link_scale: [{link_name: a, scale: 1.0}, {link_name: hand, scale: 1.1}]\nworld:",
+            "link_scale of 'hand' = 1.1: must be 1: set control.margin",
+        ),
         ("{data: []}", "{data: [1]}", "world.octomap = 'cells': must be empty"),
         ("[0, 0, 2, 1]", "[0, 0, 0, 1]", "table.1.normal = .*a direction, not zero"),
     ],
@@ -274,3 +285,18 @@ def test_package_paths_are_refused(tmp_path: Path) -> None:
     objects = [{"id": "it", "meshes": [{"resource": "package://a/b.dae"}]}]
     with pytest.raises(FileContentError, match=r"'package://a/b.dae': must be the path of a mesh"):
         read(tmp_path, yaml.safe_dump({"world": {"collision_objects": objects}}))
+
+
+@pytest.mark.parametrize("form", ["{}---\n", "---\n{}---\n", "---\n{}...\n", "{}---\n---\n"])
+def test_one_message_as_ros_prints_it(tmp_path: Path, form: str) -> None:
+    text = "world: {collision_objects: []}\n"
+    assert read(tmp_path, form.format(text)) == Scene()
+    with pytest.raises(FileContentError, match="holds 2 planning scenes, not one"):
+        read(tmp_path, f"{text}---\n{text}---\n")
+
+
+def test_a_flat_mesh_is_refused_by_name(tmp_path: Path) -> None:
+    flat = {"vertices": [[0, 0, 0], [1, 0, 0], [0, 1, 0]], "triangles": []}
+    text = yaml.safe_dump({"world": {"collision_objects": [{"id": "film", "meshes": [flat]}]}})
+    with pytest.raises(FileContentError, match="mesh 'film' has no convex hull"):
+        read(tmp_path, text)

@@ -112,12 +112,31 @@ def test_sizes_are_positive(kind: str, key: str, value: Any) -> None:
 
 
 @pytest.mark.parametrize(
+    ("kind", "fields"),
+    [
+        ("sphere", {"radius": 1e4}),
+        ("capsule", {"radius": 0.1, "length": 1e4}),
+        ("cylinder", {"radius": 0.1, "length": 1e4}),
+        ("cylinder", {"radius": 1.0, "length": 1e-9}),
+    ],
+)
+def test_what_is_too_large_or_flat_is_refused_by_name(kind: str, fields: dict[str, Any]) -> None:
+    with pytest.raises(InvalidValueError, match=r"it\..* = .*: must be at most 1000 m"):
+        OBSTACLE_TYPES[kind](name="it", **fields)
+
+
+@pytest.mark.parametrize(
     ("fields", "message"),
     [
         ({"size": (1, 0, 1)}, r"table.size = 0.0: must be a finite number > 0"),
         ({"size": (1, 1)}, r"table.size = \(1, 1\): must be of shape \(3,\), got \(2,\)"),
         ({"size": (1, 1, "1")}, r"table.size = .*must be 3 numbers"),
         ({"position": (0, np.nan, 0)}, r"table.position = .*finite"),
+        ({"size": (1, 1e-9, 1)}, r"table.size = .*, each above 1 nm and a millionth of"),
+        ({"size": (1e-320, 1e-320, 1e-320)}, r"table.size = .*, each above 1 nm"),
+        ({"size": (1, 2e3, 1)}, r"table.size = .*must be at most 1000 m"),
+        ({"size": (1e6, 1e6, 1e6)}, r"table.size = .*must be at most 1000 m"),
+        ({"position": (0, -1e6, 0)}, r"table.position = .*less than 1000 km away"),
         ({"position": 1.0}, r"table.position = 1.0: must be of shape \(3,\), got \(\)"),
         ({"position": [[0, 0], [0]]}, r"table.position = .*3 numbers"),
         ({"orientation_xyzw": (0, 0, 0, 0)}, r"table.orientation_xyzw = .*unit quaternion"),
@@ -140,6 +159,7 @@ def test_wrong_boxes(fields: dict[str, Any], message: str) -> None:
         ({"normal": (0, 1)}, r"floor.normal = .*\(3,\), got \(2,\)"),
         ({"offset": np.inf}, "floor.offset = inf: must be a finite number"),
         ({"offset": 10**400}, "floor.offset = 1000.*: must be a finite number"),
+        ({"offset": 1e6}, "floor.offset = 1000000.0: must be less than 1000 km away"),
         ({"offset": "0"}, "floor.offset = '0': must be a finite number"),
     ],
 )

@@ -190,6 +190,7 @@ def assert_judged_alike(run: Run, supervised: Run) -> None:
         np.testing.assert_array_equal(supervised.task.goal, run.task.goal)
 
 
+@pytest.mark.slow
 def test_a_supervised_run_is_judged_as_the_controllers_own(swing_up: Scenario) -> None:
     world, arm, start = swing_up.world, swing_up.arm, swing_up.start
     tracking = DensityTracking(world, plan_motion(world, start, swing_up.goal))

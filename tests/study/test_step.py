@@ -45,6 +45,7 @@ def test_without_a_switch_all_but_the_first_of_a_turn_are_steady(
     assert timing.steady_percentiles_us[0] > timing.resumed_us
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("shapes", ["hull", "capsule"])
 @pytest.mark.parametrize("pairs", [5, 64, 70])
 def test_arm_among_spheres_has_the_pairs_asked_for(shapes: str, pairs: int) -> None:

@@ -161,6 +161,12 @@ def test_what_other_threads_print_meanwhile_is_not_lost() -> None:
     assert lines[2002:] == ["at once", "still at once", *past]
 
 
+def test_a_missing_toml_file_is_called_missing(tmp_path: Path) -> None:
+    with pytest.raises(FileContentError) as caught:
+        read_toml(tmp_path / "none.toml")
+    assert str(caught.value) == f"{tmp_path / 'none.toml'}: No such file or directory"
+
+
 def test_arrays_are_computed_once_for_a_key(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

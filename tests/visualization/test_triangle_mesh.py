@@ -1,9 +1,12 @@
+from pathlib import Path
+
 import coal
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from densarm.scene.mesh_file import read_mesh
 from densarm.scene.shapes import box_hull
 from densarm.visualization.triangle_mesh import TriangleMesh, mesh_of, sphere_swept_hull, tube
 
@@ -55,6 +58,13 @@ def test_meshes_keep_their_triangles() -> None:
     assert len(mesh.faces) == 2
     first = mesh.vertices[mesh.faces[0]]
     np.testing.assert_allclose(first, corners[[0, 2, 1]])
+
+
+def test_a_mirrored_mesh_is_not_inside_out() -> None:
+    file = Path(__file__).parents[1] / "data" / "meshes" / "wedge.stl"
+    scales = (1.0, 1.0, 1.0), (1.0, -1.0, 1.0)
+    volumes = [volume(mesh_of(read_mesh(file, scale))) for scale in scales]
+    assert volumes[1] == pytest.approx(volumes[0]) == pytest.approx(0.3 * 0.2 * 0.15 / 6.0)
 
 
 @pytest.mark.parametrize(("seed", "radius"), [(0, 0.05), (1, 0.5)])

@@ -10,13 +10,13 @@ from hypothesis import strategies as st
 
 from densarm.arms.arm import Arm
 from densarm.arms.dynamics import Kinematics
+from densarm.arms.joint_space import sliding_joints
 from densarm.scene.obstacles import Box, Capsule, Sphere
 from densarm.scene.scene import Scene
 from densarm.simulation.run import Run
 from densarm.values.arrays import Array
 from densarm.world.active_pairs import ActivePairs, ExactDistances, all_exceed, longest_travel
 from densarm.world.distance_view import DistanceView
-from densarm.world.lipschitz import sliding_joints
 from densarm.world.world import DISTANCE_TOLERANCE, World
 
 SCENE = Scene(

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from densarm.arms.arm import Arm
+from densarm.arms.joints import POSITION_TOLERANCE
 from densarm.errors import DensarmError
 from densarm.scene.obstacles import Box, Obstacle, Sphere
 from densarm.scene.scene import Scene
@@ -70,8 +71,20 @@ def test_a_position_outside_the_limits_is_infeasible(arm_named: Callable[[str], 
     q[[1, 5]] = arm.limits.upper[1] + 0.1, arm.limits.lower[5] - 0.1
     phrase = infeasibility(SweptCheck(World(arm, Scene())), {"start": q})
     first, second, *_ = phrase.split("; ")
-    assert first == "start: joint 'panda_joint2' at 1.863 is outside [-1.763, 1.763]"
-    assert second == "start: joint 'panda_joint6' at -0.1175 is outside [-0.0175, 3.752]"
+    assert first == "start: joint 'panda_joint2' at 1.8628 is outside [-1.7628, 1.7628]"
+    assert second == "start: joint 'panda_joint6' at -0.1175 is outside [-0.0175, 3.7525]"
+
+
+def test_positions_at_the_limits_may_be_rounded(arm_named: Callable[[str], Arm]) -> None:
+    arm = arm_named("panda")
+    check = SweptCheck(World(arm, Scene()))
+    q = arm.postures["ready"].copy()
+    for over in (1e-15, 0.9 * POSITION_TOLERANCE):
+        q[0] = arm.limits.upper[0] + over
+        assert infeasibility(check, {"start": q}) == ""
+    q[0] = arm.limits.lower[0] - 1.1 * POSITION_TOLERANCE
+    phrase = "goal: joint 'panda_joint1' at -2.8973000011 is outside [-2.8973, 2.8973]"
+    assert infeasibility(check, {"goal": q}) == phrase
 
 
 def test_overlaps_and_gaps_below_the_margin_are_infeasible(two_link: Arm) -> None:

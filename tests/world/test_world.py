@@ -361,3 +361,20 @@ def test_wrong_configurations(two_link: Arm) -> None:
         world.clearance([0.0, 0.0])
     with pytest.raises(InvalidValueError, match=r"configuration = .*finite"):
         world.clearance([1.0, 0.0, np.nan, 0.0])
+
+
+def test_obstacles_in_the_base_are_told_as_they_come_and_go(
+    arm_named: Callable[[str], Arm],
+) -> None:
+    arm = arm_named("panda")
+    bottom = min(p[2] for p in arm.collision_model.geometryObjects[0].geometry.points())
+    table = Box(name="table", size=(1, 1, 0.1), position=(0, 0, bottom - 0.05))
+    world = World(arm, Scene([table]), spare=[Sphere(name="ball", radius=0.1)])
+    assert world.base_overlaps() == ()  # it stands there
+    world.move_obstacle("table", (0, 0, bottom - 0.05 + 0.01))
+    assert world.base_overlaps() == ("'panda_link0_0' is in 'table' by 10 mm",)
+    world.add_obstacle(Sphere(name="globe", radius=0.1))
+    assert any(" is in 'globe' by " in phrase for phrase in world.base_overlaps())
+    for name in ("table", "globe"):
+        world.remove_obstacle(name)
+    assert world.base_overlaps() == ()

@@ -1,0 +1,125 @@
+"""NearPairs: the distances of the pairs that may be near, at one configuration after another."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from densarm.values.arrays import Array
+from densarm.values.kernels import compiled
+from densarm.world.active_pairs import go, joint_numbers, pair_motion
+from densarm.world.world import DISTANCE_TOLERANCE, Pairs, World
+
+_SLACK = 0.02  # [m] beyond the smallest distance, up to which pairs are asked that may soon have it
+
+
+class NearPairs:
+    r"""Asks the pairs alone that may be nearer than a limit, along a motion.
+
+    A pair whose distance was d_k is at least :math:`d_k - \sum_j r_{kj} s_j` apart after the joints
+    have gone ways of s_j, r_kj the Lipschitz constants of the world.
+
+    Unlike `ActivePairs` it returns the very numbers of `World.distances`.
+
+    Args:
+        world: the pairs; its obstacles may change.
+    """
+
+    def __init__(self, world: World) -> None:
+        self._world = world
+        self._version = 0
+        self._smallest = np.inf
+        # Rows: after ways of s the distance is at least level - lipschitz @ s; the latter alone.
+        self._numbers = np.zeros((2, world.n_pairs))
+        # Rows: which question each pair was asked for last; a workspace.
+        self._asked = np.zeros((2, world.n_pairs), np.int64)
+        rest = world.arm.configurations(np.zeros(world.arm.nv))
+        index, joints = world.arm.joint_index, joint_numbers(world.arm)
+        self._arrays = rest, index, world.lipschitz, joints, self._numbers, self._asked
+        self._question = 0
+
+    def below(self, q: Array, limit: float) -> tuple[Pairs, Array]:
+        """Return pairs (P,) and their distances (P,) [m] at q (nq,).
+
+        All that are nearer than the limit [m] are among them.
+        """
+        self._question += 1
+        pairs, rows, _ = self._ask(q, limit)
+        return pairs.copy(), rows[pairs, 0]
+
+    def smallest(self, q: Array) -> tuple[float, int]:
+        """Return the smallest distance [m] at q (nq,) and the index of the first pair that has it.
+
+        Without pairs that is infinity and -1.
+        """
+        self._question += 1
+        limit, nearest = self._smallest + _SLACK, (np.inf, -1)
+        while True:
+            nearest = min(nearest, self._ask(q, limit)[2])
+            if nearest[0] <= limit:
+                self._smallest = nearest[0]
+                return nearest
+            limit = nearest[0]
+
+    def _ask(self, q: Array, limit: float) -> tuple[Pairs, Array, tuple[float, int]]:
+        """Ask pairs that may be below a limit [m]; return them, all rows, and the nearest."""
+        world, numbers = self._world, self._numbers
+        if self._version != world.version:
+            self._version = world.version
+            numbers[0] = np.where(world.changes < 0, np.inf, -np.inf)
+        count = _may_be_below(q, limit, self._question, *self._arrays)
+        pairs = self._asked[1, :count]
+        rows = world.query(q, pairs)
+        return pairs, rows, _learn(rows, pairs, numbers)
+
+
+def least_distances(world: World, q: Array, limit: float) -> Array:
+    """Return the least distance of each pair at configurations (N, nq), (K,) [m].
+
+    Of pairs that stay beyond a limit [m] it is the least that was met, or infinity.
+    """
+    near, least = NearPairs(world), np.full(world.n_pairs, np.inf)
+    for row in q:
+        pairs, distance = near.below(row, limit)
+        least[pairs] = np.minimum(least[pairs], distance)
+    return least
+
+
+def smallest_distances(world: World, q: Array) -> Array:
+    """Return the smallest distance of all pairs at configurations (N, nq), (N,) [m]."""
+    pairs = NearPairs(world)
+    return np.array([pairs.smallest(row)[0] for row in q])
+
+
+@compiled
+def _may_be_below(
+    q: Array,
+    limit: float,
+    question: int,
+    q_last: Array,
+    joint_index: NDArray[np.int64],
+    lipschitz: Array,
+    joints: Array,
+    numbers: Array,
+    asked: NDArray[np.int64],
+) -> int:
+    """Go on to q; write which pairs have not been asked for a question, and are to be: how many."""
+    level, gone, count = numbers[0], numbers[1], 0
+    holds = go(q, q_last, joint_index, joints)
+    for k in range(level.shape[0]):
+        if not holds and level[k] < np.inf:  # else it is spare
+            level[k] = -np.inf
+        gone[k] = pair_motion(lipschitz, k, joints[0])
+        if asked[0, k] != question and level[k] - gone[k] - 2.0 * DISTANCE_TOLERANCE < limit:
+            asked[0, k], asked[1, count] = question, k
+            count += 1
+    return count
+
+
+@compiled
+def _learn(rows: Array, pairs: Pairs, numbers: Array) -> tuple[float, int]:
+    """Bound distances of pairs from now on; return the smallest and the pair that has it."""
+    smallest, nearest = np.inf, -1
+    for k in pairs:
+        numbers[0, k] = rows[k, 0] + numbers[1, k]
+        if rows[k, 0] < smallest:
+            smallest, nearest = rows[k, 0], k
+    return smallest, nearest
