@@ -24,6 +24,7 @@ _SAMPLES = 5000  # random configurations in which hulls are compared with meshes
 _APART = 0.004  # [m], by which meshes must be apart there for the hulls to matter
 _CLEAR = 0.002  # [m], by which pieces shall be apart there
 _COMPARED = 500  # of those configurations, for each pair, in which pieces are tried
+_DOING = "cutting links into convex pieces, once on this machine"
 _KEPT = (4, MOST_PIECES, LEAST_GAIN, LARGE, _SAMPLES, _APART, _CLEAR, _COMPARED)
 
 _Pair = tuple[int, int]
@@ -108,7 +109,7 @@ class _Links:
             parts, halves = convex_tree(vertices[corners])
             return {"halves": halves.astype(float), **{f"{k}": x for k, x in enumerate(parts)}}
 
-        kept = kept_arrays(f"tree {_KEPT[:3]}{self._key(link)}", cut)
+        kept = kept_arrays(f"tree {_KEPT[:3]}{self._key(link)}", cut, _DOING)
         halves = kept["halves"].astype(np.int64)
         return ConvexTree([kept[f"{k}"] for k in range(len(halves))], halves)
 
@@ -153,7 +154,7 @@ class _Links:
         shapes = [f"{h.parentJoint} {h.placement}{self._key(k)}" for k, h in enumerate(self._hulls)]
         key = f"fronts {_KEPT}{self._model.saveToString()}{shapes}{concerned}"
         result: dict[_Pair, _Front] = {}
-        for i, j, a, b in kept_arrays(key, decide)["fronts"].astype(int).tolist():
+        for i, j, a, b in kept_arrays(key, decide, _DOING)["fronts"].astype(int).tolist():
             result.setdefault((i, j), []).append((a, b))
         return {pair: front for pair, front in result.items() if front != [(0, 0)]}
 

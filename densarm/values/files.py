@@ -69,11 +69,25 @@ def atomic_file(path: Path) -> Iterator[BinaryIO]:
         Path(temporary).unlink(missing_ok=True)
 
 
-def kept_arrays(key: str, compute: Callable[[], dict[str, Array]]) -> dict[str, Array]:
+_waits: list[Callable[[str], object]] = []
+
+
+@contextmanager
+def on_waiting(tell: Callable[[str], object]) -> Iterator[None]:
+    """Call `tell` with a phrase before anything that is computed once on a machine."""
+    _waits.append(tell)
+    try:
+        yield
+    finally:
+        _waits.remove(tell)
+
+
+def kept_arrays(key: str, compute: Callable[[], dict[str, Array]], doing: str) -> dict[str, Array]:
     """Return arrays by name, computed once on this machine for a key that tells all they depend on.
 
     They are kept where numba keeps kernels if ``NUMBA_CACHE_DIR`` says so, or else in the user's
-    folder for caches; where neither can be written to, they are computed each time.
+    folder for caches; where neither can be written to, they are computed each time. `on_waiting`
+    tells of it by the phrase.
     """
     # Not Path.expanduser, which raises where the user has no home.
     caches = os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")  # noqa: PTH111
@@ -81,6 +95,8 @@ def kept_arrays(key: str, compute: Callable[[], dict[str, Array]]) -> dict[str, 
     path = folder / f"densarm-{sha256(key.encode()).hexdigest()}.npz"
     with suppress(OSError, ValueError, EOFError, BadZipFile), path.open("rb") as file:
         return dict(np.load(file))
+    for tell in _waits:
+        tell(doing)
     arrays = compute()
     with suppress(OSError, FileContentError):
         folder.mkdir(parents=True, exist_ok=True)

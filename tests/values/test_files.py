@@ -14,6 +14,7 @@ from densarm.values.files import (
     atomic_file,
     captured_stderr,
     kept_arrays,
+    on_waiting,
     read_text,
     read_toml,
 )
@@ -179,9 +180,12 @@ def test_arrays_are_computed_once_for_a_key(
             asked.append(key)
             return {"x": np.full(2, float(len(asked)))}
 
-        return float(kept_arrays(key, compute)["x"][1])
+        return float(kept_arrays(key, compute, f"computing {key}")["x"][1])
 
-    assert [array("a"), array("b"), array("a")] == [1.0, 2.0, 1.0]
+    told: list[str] = []
+    with on_waiting(told.append):
+        assert [array("a"), array("b"), array("a")] == [1.0, 2.0, 1.0]
+    assert told == ["computing a", "computing b"]
     for file in (tmp_path / "densarm").iterdir():
         file.write_bytes(b"PK broken")
     assert array("a") == 3.0
