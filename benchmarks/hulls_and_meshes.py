@@ -19,11 +19,12 @@ from numpy.typing import NDArray
 from densarm import load_arm
 from densarm.arms.arm import Arm
 from densarm.arms.catalogue import robot_names
-from densarm.arms.convex_pieces import winding_number
+from densarm.arms.link_pieces import one_inside_the_other
 from densarm.arms.models import build_collision_meshes
 from densarm.scene.mesh import indexed_triangles
 from densarm.scene.scene import Scene
 from densarm.scene.shapes import convex_hull
+from densarm.values.arrays import Array
 from densarm.world.world import DISTANCE_TOLERANCE, World
 
 APART = 0.005  # [m]
@@ -44,7 +45,7 @@ def compared(arm: Arm, configurations: int) -> Counts:
     models = [geometry([change(x) for x in drawn.values()], list(own)) for change in (hull, mesh)]
     hulls, meshes = ((model, model.createData()) for model in models)
     counts = {pair: np.zeros(len(COLUMNS), dtype=np.int64) for pair in own}
-    random = np.random.default_rng(SEED)
+    random, surfaces = np.random.default_rng(SEED), dict[int, Array]()
     low, high = np.clip([arm.limits.lower, arm.limits.upper], -np.pi * 2.0, np.pi * 2.0)
     for _ in range(configurations):
         q = arm.configuration(random.uniform(low, high))
@@ -54,7 +55,7 @@ def compared(arm: Arm, configurations: int) -> Counts:
         for k, (pair, indices) in enumerate(own.items()):
             if pin.computeDistance(*hulls, k).min_distance <= 0.0:
                 gap = pin.computeDistance(*meshes, k).min_distance
-                if gap > 0.0 and one_inside_the_other(*meshes, k):
+                if gap > 0.0 and one_inside_the_other(*meshes, k, surfaces):
                     gap = 0.0  # by their surfaces they are apart
                 overlap = distances[indices].min() <= DISTANCE_TOLERANCE
                 apart = gap >= APART
@@ -89,20 +90,6 @@ def mesh(item: pin.GeometryObject) -> pin.GeometryObject:
         item.geometry.addTriangles(triangles)
         item.geometry.endModel()
     return item
-
-
-def one_inside_the_other(model: pin.GeometryModel, data: pin.GeometryData, k: int) -> bool:
-    """Return whether one of two bodies whose surfaces do not meet lies inside the other."""
-    pair = model.collisionPairs[k]
-    for one, other in ((pair.first, pair.second), (pair.second, pair.first)):
-        inner, outer = (model.geometryObjects[i].geometry for i in (one, other))
-        if isinstance(outer, coal.BVHModelBase):
-            vertices, triangles = indexed_triangles(outer)
-            corner = inner.vertices()[0] if isinstance(inner, coal.BVHModelBase) else np.zeros(3)
-            point = data.oMg[other].actInv(data.oMg[one].act(np.array(corner)))
-            if abs(winding_number(vertices[triangles], point)) > 0.5:
-                return True
-    return False
 
 
 def main() -> int:

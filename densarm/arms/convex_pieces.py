@@ -17,6 +17,7 @@ LEAST_GAIN = 0.01
 """Part of the hull's volume that each cut must take away."""
 
 _POSITIONS = 9  # planes tried along each axis, and again between the best one's neighbours
+_TRIANGLES = 4000  # about so many of a part's, evenly chosen, by which cuts are compared
 _TOLERANCE = 1e-9  # per extent of the mesh, by which a corner may lie beyond a plane
 _INSIDE = 0.1  # winding number, which rounding or a hole in the mesh make no whole one
 
@@ -87,7 +88,10 @@ def convex_tree(
 
 def _part(inside: Array, mesh: Array, planes: Array) -> _Part:
     """Return a part; of infinite volume, so that no cut makes it, if it has no convex hull."""
-    corners, volume = _hull(np.vstack([inside.reshape(-1, 3), _inner_corners(mesh, planes)]))
+    corners, volume = _hull(inside.reshape(-1, 3))
+    inner = _inner_corners(mesh, planes, corners)
+    if len(inner) > 0:
+        corners, volume = _hull(np.vstack([corners, inner]))
     try:
         convex_hull(corners)
     except RobotDescriptionError:
@@ -98,11 +102,12 @@ def _part(inside: Array, mesh: Array, planes: Array) -> _Part:
 def _halves(part: _Part, mesh: Array) -> list[_Part]:
     """Return the two parts that the best cut makes of one."""
     low, high = part.corners.min(axis=0), part.corners.max(axis=0)
-    points = np.unique(part.triangles.reshape(-1, 3), axis=0)
-    cuts = [_best_cut(part.triangles, points, k, low[k], high[k]) for k in range(3)]
+    few = part.triangles[:: len(part.triangles) // _TRIANGLES + 1]
+    points = np.vstack([np.unique(few.reshape(-1, 3), axis=0), part.corners])
+    cuts = [_best_cut(few, points, k, low[k], high[k]) for k in range(3)]
     _, axis, position = min(cuts)
     near = (high[axis] - low[axis]) / (_POSITIONS + 1)
-    finer = _best_cut(part.triangles, points, axis, position - near, position + near)
+    finer = _best_cut(few, points, axis, position - near, position + near)
     _, axis, position = min(*cuts, finer)
     halves = []
     for side in (1.0, -1.0):
@@ -188,20 +193,36 @@ def _hull(points: Array) -> tuple[Array, float]:
     return points[is_corner], float(hull.volume)
 
 
-def _inner_corners(mesh: Array, planes: Array) -> Array:
-    """Return where three planes meet (M, 3), on the right side of all and inside of a mesh."""
+def _inner_corners(mesh: Array, planes: Array, known: Array) -> Array:
+    """Return where three planes meet (M, 3), on the right side of all and inside of a mesh.
+
+    Those in the hull of known corners, which they would not change, are left out.
+    """
     slack = _TOLERANCE * float(np.abs(mesh).max())
     triples = [planes[list(three)] for three in combinations(range(len(planes)), 3)]
     meet = [np.linalg.solve(t[:, :3], t[:, 3]) for t in triples if np.linalg.det(t[:, :3]) != 0.0]
     corners = np.array(meet).reshape(-1, 3)
     corners = corners[(corners @ planes[:, :3].T <= planes[:, 3] + slack).all(axis=1)]
+    if len(corners) > 0:
+        corners = corners[_are_outside(corners, known)]
     return corners[[abs(winding_number(mesh, corner)) > _INSIDE for corner in corners]]
+
+
+def _are_outside(points: Array, corners: Array) -> NDArray[np.bool_]:
+    """Return which points are not in the hull of corners; all if that has no volume."""
+    from scipy.spatial import ConvexHull, QhullError
+
+    try:
+        faces = ConvexHull(corners).equations
+    except (QhullError, ValueError):
+        return np.ones(len(points), dtype=np.bool_)
+    return np.asarray((points @ faces[:, :3].T + faces[:, 3] > 0.0).any(axis=1))
 
 
 def winding_number(mesh: Array, point: Array) -> float:
     """Return how often triangles (N, 3, 3) wind around a point (3,): 0 outside of a closed mesh."""
     a, b, c = (mesh - point).swapaxes(0, 1)
-    la, lb, lc = (np.linalg.norm(edge, axis=1) for edge in (a, b, c))
+    la, lb, lc = (np.sqrt(np.einsum("ij,ij->i", edge, edge)) for edge in (a, b, c))
     volume = np.einsum("ij,ij->i", a, np.cross(b, c))
     dots = [np.einsum("ij,ij->i", x, y) * z for x, y, z in ((a, b, lc), (b, c, la), (c, a, lb))]
     return float(np.arctan2(volume, la * lb * lc + sum(dots)).sum() / (2.0 * np.pi))

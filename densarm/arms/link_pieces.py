@@ -10,7 +10,13 @@ import coal
 import numpy as np
 import pinocchio as pin
 
-from densarm.arms.convex_pieces import LEAST_GAIN, MOST_PIECES, ConvexTree, convex_tree
+from densarm.arms.convex_pieces import (
+    LEAST_GAIN,
+    MOST_PIECES,
+    ConvexTree,
+    convex_tree,
+    winding_number,
+)
 from densarm.arms.self_collision import ExcludedPair, Exclusion, random_configurations
 from densarm.scene.mesh import indexed_triangles
 from densarm.scene.shapes import convex_hull, extreme_points
@@ -24,10 +30,14 @@ _SAMPLES = 5000  # random configurations in which hulls are compared with meshes
 _APART = 0.004  # [m], by which meshes must be apart there for the hulls to matter
 _CLEAR = 0.002  # [m], by which pieces shall be apart there
 _COMPARED = 500  # of those configurations, for each pair, in which pieces are tried
+_LOOKED_AT = 60_000_000  # triangles of meshes that are compared there, which bounds the time
+_CUT = 150_000  # triangles of links that are cut for some pairs alone
 _DOING = "cutting links into convex pieces, once on this machine"
-_KEPT = (4, MOST_PIECES, LEAST_GAIN, LARGE, _SAMPLES, _APART, _CLEAR, _COMPARED)
+_KEPT = (5, MOST_PIECES, LEAST_GAIN, LARGE, _SAMPLES, _APART, _CLEAR, _COMPARED, _LOOKED_AT, _CUT)
 
 _Pair = tuple[int, int]
+_Known = list[tuple[_Pair, list[Array]]]
+"""Pairs, and configurations where their hulls overlap and their meshes do not."""
 _Front = list[_Pair]
 """Parts of two links, by their indices, that together stand for each pair of their pieces."""
 
@@ -89,9 +99,9 @@ class _Links:
             drawn.geometryObjects[drawn.getGeometryId(item.name)] for item in self._hulls
         ]
         self.is_large = [
-            isinstance(item.geometry, coal.BVHModelBase)
+            self._triangles(k) > 0
             and hull.geometry.computeVolume() > LARGE * abs(item.geometry.computeVolume())
-            for hull, item in zip(self._hulls, self._drawn, strict=True)
+            for k, (hull, item) in enumerate(zip(self._hulls, self._drawn, strict=True))
         ]
 
     def index(self, pair: ExcludedPair) -> _Pair:
@@ -147,18 +157,18 @@ class _Links:
             return {}
 
         def decide() -> dict[str, Array]:
-            found = self._hulls_alone(concerned)
+            found = self._affordable(self._hulls_alone(concerned))
             rows = [(*pair, *parts) for pair, known in found for parts in self._front(pair, known)]
             return {"fronts": np.array(rows, dtype=np.float64).reshape(-1, 4)}
 
-        shapes = [f"{h.parentJoint} {h.placement}{self._key(k)}" for k, h in enumerate(self._hulls)]
-        key = f"fronts {_KEPT}{self._model.saveToString()}{shapes}{concerned}"
+        shapes = [self._key(k) for k in range(len(self._hulls))]
+        key = f"fronts {_KEPT}{self._motion()}{shapes}{concerned}"
         result: dict[_Pair, _Front] = {}
         for i, j, a, b in kept_arrays(key, decide, _DOING)["fronts"].astype(int).tolist():
             result.setdefault((i, j), []).append((a, b))
         return {pair: front for pair, front in result.items() if front != [(0, 0)]}
 
-    def _hulls_alone(self, pairs: list[_Pair]) -> list[tuple[_Pair, list[Array]]]:
+    def _hulls_alone(self, pairs: list[_Pair]) -> _Known:
         """Return pairs and configurations where their hulls overlap and their meshes do not."""
         models = [_geometry_model(items, pairs) for items in (self._hulls, self._drawn)]
         hulls, meshes = ((model, model.createData()) for model in models)
@@ -166,14 +176,32 @@ class _Links:
             request.security_margin = _APART
         model, data = self._model, self._model.createData()
         found: list[list[Array]] = [[] for _ in pairs]
+        surfaces: dict[int, Array] = {}
+        looked_at = 0
         for q in random_configurations(model, _SAMPLES):
+            if looked_at > _LOOKED_AT:
+                break
             if not pin.computeCollisions(model, data, *hulls, q, False):
                 continue
             pin.updateGeometryPlacements(model, data, *meshes)
             for k, result in enumerate(hulls[1].collisionResults):
                 if result.isCollision() and len(found[k]) < _COMPARED:
-                    found[k] += [] if pin.computeCollision(*meshes, k) else [q]
+                    looked_at += sum(map(self._triangles, pairs[k]))
+                    touching = pin.computeCollision(*meshes, k)
+                    if not touching and not one_inside_the_other(*meshes, k, surfaces):
+                        found[k].append(q)
         return [(pair, known) for pair, known in zip(pairs, found, strict=True) if known]
+
+    def _affordable(self, found: _Known) -> _Known:
+        """Return the pairs whose links may be cut, those that need it most often first."""
+        chosen, cut, left = [], set[int](), _CUT
+        for pair, known in sorted(found, key=lambda item: -len(item[1])):
+            needed = {link for link in pair if self.is_large[link]} - cut
+            cost = sum(map(self._triangles, needed))
+            if cost <= left:
+                chosen.append((pair, known))
+                cut, left = cut | needed, left - cost
+        return chosen
 
     def _front(self, pair: _Pair, configurations: list[Array]) -> _Front:
         """Return parts that are apart in as many of some configurations as those of any cut."""
@@ -222,6 +250,26 @@ class _Links:
         found = [whole(pieces[0], [0]), whole([0], pieces[1]), refined((0, 0), range(len(poses)))]
         return min(found, key=lambda cut: (len(cut[1]), len(cut[0])))[0]
 
+    def _triangles(self, link: int) -> int:
+        """Return the number of a link's triangles, 0 if it is no mesh."""
+        shape = self._drawn[link].geometry
+        return int(shape.num_tris) if isinstance(shape, coal.BVHModelBase) else 0
+
+    def _motion(self) -> str:
+        """Return what tells how the shapes move against each other, wherever the base is."""
+        joints, placements = list(self._model.joints)[1:], self._model.jointPlacements
+        base = placements[1].inverse()
+        placed = [
+            (k, base * pose if k == 0 else pose)
+            for k, pose in [(self._model.parents[j.id], placements[j.id]) for j in joints]
+            + [(hull.parentJoint, hull.placement) for hull in self._hulls]
+        ]
+        # Rounded, since where the base is changes the last digits; 0.0 takes the sign off a zero.
+        poses = [(k, (np.round(pose.homogeneous, 9) + 0.0).tolist()) for k, pose in placed]
+        axes = [(joint.nq, joint.createData().S.tolist()) for joint in joints]
+        limits = self._model.lowerPositionLimit, self._model.upperPositionLimit
+        return f"{poses}{axes}{[x.tolist() for x in limits]}"
+
     def _key(self, link: int) -> str:
         """Return what tells a shape from others: of a mesh, its file and its scaled vertices."""
         item = self._drawn[link]
@@ -229,6 +277,34 @@ class _Links:
             return f"{extreme_points(self._hulls[link].geometry)}"
         vertices = np.array(item.geometry.vertices()).tobytes()
         return sha256(Path(item.meshPath).read_bytes() + vertices).hexdigest()
+
+
+def one_inside_the_other(
+    model: pin.GeometryModel, data: pin.GeometryData, k: int, surfaces: dict[int, Array]
+) -> bool:
+    """Return whether one of two bodies whose surfaces do not meet lies inside the other.
+
+    Args:
+        model: meshes and other shapes, and pairs of them.
+        data: their placements.
+        k: index of the pair.
+        surfaces: where triangles of meshes (N, 3, 3) [m] are kept from call to call, by index.
+    """
+    pair = model.collisionPairs[k]
+    for one, other in ((pair.first, pair.second), (pair.second, pair.first)):
+        inner, outer = (model.geometryObjects[i].geometry for i in (one, other))
+        if not isinstance(outer, coal.BVHModelBase):
+            continue
+        points = inner.vertices() if isinstance(inner, coal.BVHModelBase) else np.zeros((1, 3))
+        pose, around = data.oMg[other].actInv(data.oMg[one]), np.array(outer.vertices())
+        points = points @ pose.rotation.T + pose.translation
+        if (points > around.min(axis=0)).all() and (points < around.max(axis=0)).all():
+            if other not in surfaces:
+                vertices, triangles = indexed_triangles(outer)
+                surfaces[other] = vertices[triangles]
+            if abs(winding_number(surfaces[other], points[0])) > 0.5:
+                return True
+    return False
 
 
 def _geometry_model(items: list[pin.GeometryObject], pairs: list[_Pair]) -> pin.GeometryModel:
