@@ -31,7 +31,7 @@ _APART = 0.004  # [m], by which meshes must be apart there for the hulls to matt
 _CLEAR = 0.002  # [m], by which pieces shall be apart there
 _COMPARED = 500  # of those configurations, for each pair, in which pieces are tried
 _LOOKED_AT = 60_000_000  # triangles of meshes that are compared there, which bounds the time
-_CUT = 150_000  # triangles of links that are cut for some pairs alone
+_CUT = 125_000  # triangles of links that are cut for some pairs alone
 _DOING = "cutting links into convex pieces, once on this machine"
 _KEPT = (5, MOST_PIECES, LEAST_GAIN, LARGE, _SAMPLES, _APART, _CLEAR, _COMPARED, _LOOKED_AT, _CUT)
 
