@@ -285,7 +285,7 @@ def load_arm(
     locked_joints: Mapping[str, float] | None = None,
     cut_joints: Iterable[str] = (),
     base_placement: pin.SE3 | None = None,
-    shapes: str = "hull",
+    shapes: str | None = None,
     collision_from_visual: str | None = None,
     inertia: str | None = None,
     density: float | None = None,
@@ -311,7 +311,8 @@ def load_arm(
             their meshes are 4 mm apart; "pieces" for pieces in all pairs, of every link whose hull
             is much larger than its mesh; or "capsule" for the smallest capsule around each hull:
             larger, but distances cost less. Each encloses the meshes. Pieces are made once on a
-            machine, which takes seconds. Pairs that always collide are left out in either.
+            machine, which takes seconds. Pairs that always collide are left out in either. None for
+            "hull", unless a known robot needs another.
         collision_from_visual: which links collide as they are drawn: "missing" for those without
             collision geometry, "always" for all that are drawn, or "never"; None for "missing",
             unless a known robot needs another. `Arm.links_without_collision` names those concerned.
@@ -331,10 +332,7 @@ def load_arm(
     """
     description = robot_description(robot)
     folders = [str(Path(folder).resolve()) for folder in _listed(package_dirs)]
-    changes: dict[str, Any] = {
-        "shapes": shapes,
-        "package_dirs": [*folders, *description.package_dirs],
-    }
+    changes: dict[str, Any] = {"package_dirs": [*folders, *description.package_dirs]}
     if srdf is not None:
         changes["srdf"] = read_text(Path(srdf))
     if base_placement is not None:
@@ -342,6 +340,7 @@ def load_arm(
             raise InvalidValueError("base_placement", base_placement, "a pinocchio.SE3")
         changes["base_placement"] = pin.SE3ToXYZQUAT(base_placement).tolist()
     chosen = {
+        "shapes": shapes,
         "collision_from_visual": collision_from_visual,
         "inertia": inertia,
         "density": density,

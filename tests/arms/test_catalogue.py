@@ -23,8 +23,8 @@ from densarm.world.world import World
 
 loaded = cache(load_arm)
 
-# Meshes of many triangles take seconds to load.
-LARGE = {"so101", "z1"}
+# Meshes of many triangles take seconds to load, and the first time to cut into pieces.
+LARGE = {"kinova", "so100", "so101", "z1"}
 SLOW = [pytest.param(name, marks=pytest.mark.slow) for name in sorted(LARGE)]
 
 
@@ -112,6 +112,6 @@ def test_catalogue() -> None:
     assert {"swing_up", "panda_table", "panda_shelf"} <= set(scenario_paths())
     for name in robot_names():
         assert (robots_folder() / name / "arm.toml").is_file()
-        assert Arm(robot_description(name)).name == name
+        assert loaded(name).name == name
     with pytest.raises(UnknownNameError, match=r"'tow_link'; did you mean 'two_link'"):
         robot_description("tow_link")

@@ -5,11 +5,12 @@ from dataclasses import replace
 from itertools import product
 from pathlib import Path
 
+import coal
 import numpy as np
 import pinocchio as pin
 import pytest
 
-from densarm.arms import link_pieces
+from densarm.arms import catalogue, link_pieces
 from densarm.arms.arm import Arm, load_arm
 from densarm.arms.catalogue import robot_description
 from densarm.arms.convex_pieces import ConvexTree, convex_tree
@@ -145,6 +146,61 @@ def test_pieces_are_made_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, k
     os.utime(mesh, (0, 0))  # coal sees changes by whole seconds
     assert clearance(load_arm(path), 0.0, 0.0) == pytest.approx(0.1, abs=1e-6)
     assert made == [24, 24, 24]
+
+
+def test_pieces_are_known_wherever_the_base_is(tmp_path: Path, kept: Path) -> None:
+    path = fork(tmp_path)
+    load_arm(path)
+    files = set(kept.iterdir())
+    for angles in ((0.3, -2.0, 0.7), (0.0, 1.0, 0.0)):
+        base = pin.SE3(pin.rpy.rpyToMatrix(*angles), np.array([0.1, -2.0, 7.0]))
+        arm = load_arm(path, base_placement=base)
+        assert pairs_of(arm) == PAIRS
+        assert clearance(arm, 0.1, 0.1) == pytest.approx(0.05, abs=1e-6)
+    assert set(kept.iterdir()) == files
+    load_arm(fork(tmp_path, "-0.6 0.5"))  # another arm
+    assert len(set(kept.iterdir()) - files) == 1
+
+
+@pytest.mark.parametrize("bound", ["_CUT", "_LOOKED_AT"])
+def test_links_that_take_too_long_stay_hulls(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, bound: str
+) -> None:
+    monkeypatch.setattr(link_pieces, bound, -1)
+    arm = load_arm(fork(tmp_path))
+    assert pairs_of(arm) == {("fork_0", "tongue_0")}
+    assert clearance(arm, 0.0, 0.0) < 0.0
+
+
+@pytest.mark.parametrize(("size", "x"), [(0.02, 0.3), (0.02, 0.0), (0.02, 0.9), (2.0, 0.0)])
+def test_one_body_inside_the_other(tmp_path: Path, size: float, x: float) -> None:
+    fork(tmp_path)
+    mesh = coal.MeshLoader(coal.BV_OBB).load(str(tmp_path / "fork.obj"), np.ones(3))
+    place = pin.SE3(np.eye(3), np.array([x, 0.0, 0.0]))
+    items = [
+        pin.GeometryObject("fork", 0, pin.SE3.Identity(), mesh),
+        pin.GeometryObject("box", 0, place, coal.Box(size, size, size)),
+    ]
+    for first, second in (items, items[::-1]):
+        model = pin.GeometryModel()
+        for item in (first, second):
+            model.addGeometryObject(item)
+        model.addCollisionPair(pin.CollisionPair(0, 1))
+        data = model.createData()
+        pin.updateGeometryPlacements(pin.Model(), pin.Data(pin.Model()), model, data, np.empty(0))
+        # In a bar; between the bars; beyond them; around them, which counts for meshes alone.
+        assert link_pieces.one_inside_the_other(model, data, 0, {}) == (x == 0.3)
+
+
+def test_a_named_arm_may_be_in_pieces(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "own").mkdir()
+    entry = f'urdf = "{fork(tmp_path / "own").name}"\nshapes = "pieces"\n'
+    (tmp_path / "own" / "arm.toml").write_text(entry)
+    monkeypatch.setattr(catalogue, "robots_folder", lambda: tmp_path)
+    arm = load_arm("own")
+    assert pairs_of(arm) == PAIRS
+    assert not arm.self_pieces  # they stand for the fork in all pairs
+    assert load_arm("own", shapes="hull").self_pieces
 
 
 @pytest.mark.slow
