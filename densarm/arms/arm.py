@@ -308,11 +308,11 @@ def load_arm(
         base_placement: pose of the base in the world; gravity and obstacles stay.
         shapes: "hull" for the convex hulls of the collision geometry, but in convex pieces for
             those pairs of links whose hulls overlap, in some of 5,000 random configurations, where
-            their meshes are 4 mm apart; "pieces" for pieces in all pairs, of every link whose hull
-            is much larger than its mesh; or "capsule" for the smallest capsule around each hull:
-            larger, but distances cost less. Each encloses the meshes. Pieces are made once on a
-            machine, which takes seconds. Pairs that always collide are left out in either. None for
-            "hull", unless a known robot needs another.
+            their meshes are 4 mm apart, as far as some seconds of work go; "pieces" for pieces in
+            all pairs, of every link whose hull is much larger than its mesh; or "capsule" for the
+            smallest capsule around each hull: larger, but distances cost less. Each encloses the
+            meshes. Pieces are made once on a machine. Pairs that always collide are left out in
+            either. None for "hull", unless a known robot needs another.
         collision_from_visual: which links collide as they are drawn: "missing" for those without
             collision geometry, "always" for all that are drawn, or "never"; None for "missing",
             unless a known robot needs another. `Arm.links_without_collision` names those concerned.
