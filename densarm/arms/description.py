@@ -46,7 +46,10 @@ class RobotDescription:
     postures: Mapping[str, Vector] = field(default_factory=dict)
     """Named joint positions, one number per joint [rad or m]."""
     shapes: str = "hull"
-    """What distances are measured to: each "hull", or the smallest "capsule" around it."""
+    """What distances are measured to: each "hull", "pieces" of it, or a "capsule" around it.
+
+    With hulls, pieces stand in where two links' hulls overlap and their meshes do not.
+    """
     collision_from_visual: str = "missing"
     """Which links collide as drawn: "never", those "missing" collision geometry, or "always"."""
     inertia: str = "given"
@@ -57,7 +60,7 @@ class RobotDescription:
     """Bodies that the arm holds."""
 
     def __post_init__(self) -> None:
-        one_of("shapes", self.shapes, ["hull", "capsule"])
+        one_of("shapes", self.shapes, ["hull", "pieces", "capsule"])
         drawn = ["never", "missing", "always"]
         one_of("collision_from_visual", self.collision_from_visual, drawn)
         one_of("inertia", self.inertia, ["given", "from_shapes"])

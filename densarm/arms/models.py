@@ -17,6 +17,7 @@ from densarm.arms.collision_shapes import (
 )
 from densarm.arms.description import RobotDescription, parse_robot_xml
 from densarm.arms.joints import lock_joints
+from densarm.arms.link_pieces import CutGeometry, cut_into_pieces
 from densarm.arms.masses import (
     DEFAULT_DENSITY,
     add_masses,
@@ -48,6 +49,8 @@ class RobotModels(NamedTuple):
     collision: pin.GeometryModel
     excluded_pairs: tuple[ExcludedPair, ...]
     """The pairs of shapes that it leaves out."""
+    self_pieces: frozenset[str]
+    """Names of the shapes that are in self-collision pairs alone."""
     mesh_files: dict[str, Path]
     """The collision meshes that were read, by their path from the folder that holds them all."""
     links_without_collision: tuple[str, ...]
@@ -103,7 +106,12 @@ def build_models(description: RobotDescription) -> RobotModels:
     needed = needed_masses(model)
     excluded = add_self_collision_pairs(model, collision, description.srdf)
     excluded += remove_always_colliding_pairs(model, collision)
-    _attach(model, collision, description.attachments)
+    cut = CutGeometry(collision, excluded, frozenset())
+    if description.shapes != "capsule":
+        everywhere = description.shapes == "pieces"
+        cut = cut_into_pieces(model, collision, described, excluded, everywhere=everywhere)
+    collision = cut.geometry
+    _attach(model, collision, description.attachments, cut.self_pieces)
     for attachment in description.attachments:
         if attachment.mass > 0.0:
             items = _attached_shapes(model, attachment)
@@ -111,7 +119,12 @@ def build_models(description: RobotDescription) -> RobotModels:
             model.appendBodyToJoint(items[0].parentJoint, inertia, pin.SE3.Identity())
     remarks = (*urdf.remarks, *flat, *unknown_links(model, description.srdf))
     drawn = urdf.links_without_collision
-    return RobotModels(model, collision, excluded, files, drawn, remarks, needed, origin)
+    return RobotModels(model, *cut, files, drawn, remarks, needed, origin)
+
+
+def build_collision_meshes(description: RobotDescription) -> pin.GeometryModel:
+    """Build Pinocchio's collision geometry as the URDF has it, which an arm's shapes enclose."""
+    return _placed_models(description, Urdf(description), pin.GeometryType.COLLISION)[1]
 
 
 def build_visual_model(description: RobotDescription) -> pin.GeometryModel:
@@ -241,7 +254,10 @@ def _immovable(model: pin.Model, joint: pin.JointModel, stuck: list[str]) -> str
 
 
 def _attach(
-    model: pin.Model, geometry: pin.GeometryModel, attachments: Iterable[Attachment]
+    model: pin.Model,
+    geometry: pin.GeometryModel,
+    attachments: Iterable[Attachment],
+    self_pieces: frozenset[str] = frozenset(),
 ) -> None:
     """Add the shapes of held bodies; each pairs with what moves against it and it may not touch."""
     held = [(body, item) for body in attachments for item in _attached_shapes(model, body)]
@@ -253,11 +269,12 @@ def _attach(
         geometry.addGeometryObject(item)
     links = [model.frames[item.parentFrame].name for item in geometry.geometryObjects]
     joints = [item.parentJoint for item in geometry.geometryObjects]
+    whole = [k for k, o in enumerate(geometry.geometryObjects) if o.name not in self_pieces]
     for attachment, item in held:
         for link in attachment.touch_links:
             _frame(model, link, attachment)
         index = geometry.getGeometryId(item.name)
-        for other in range(geometry.ngeoms):
+        for other in whole:
             if joints[other] != item.parentJoint and links[other] not in attachment.touch_links:
                 # Pinocchio refuses the pair that two attached bodies both ask for.
                 pair = pin.CollisionPair(min(index, other), max(index, other))

@@ -105,12 +105,10 @@ def remove_always_colliding_pairs(
     """
     pairs = list(geometry.collisionPairs)
     data, geometry_data = model.createData(), geometry.createData()
-    random = np.random.default_rng(0)
     colliding = np.ones(len(pairs), dtype=bool)
-    for _ in range(_SAMPLES):
+    for q in random_configurations(model, _SAMPLES):
         if not colliding.any():
             break
-        q = _random_configuration(model, random)
         pin.updateGeometryPlacements(model, data, geometry, geometry_data, q)
         for k in np.flatnonzero(colliding):
             colliding[k] = pin.computeCollision(geometry, geometry_data, int(k))
@@ -120,6 +118,23 @@ def remove_always_colliding_pairs(
         geometry.removeCollisionPair(pin.CollisionPair(i, j))
     names = [item.name for item in geometry.geometryObjects]
     return tuple(ExcludedPair((names[i], names[j]), Exclusion.ALWAYS) for i, j in always)
+
+
+def random_configurations(model: pin.Model, count: int) -> Iterator[Array]:
+    """Yield random configurations (nq,) within the limits, the same ones at every call."""
+    # pin.randomConfiguration draws from a global seed and fails on unbounded joints.
+    random = np.random.default_rng(0)
+    limits = np.clip([model.lowerPositionLimit, model.upperPositionLimit], -_FARTHEST, _FARTHEST)
+    joints = list(model.joints)[1:]
+    for _ in range(count):
+        q = np.zeros(model.nq)
+        for joint in joints:
+            if joint.nq == 2:
+                angle = random.uniform(-np.pi, np.pi)
+                q[joint.idx_q : joint.idx_q + 2] = np.cos(angle), np.sin(angle)
+            else:
+                q[joint.idx_q] = random.uniform(*limits[:, joint.idx_q])
+        yield q
 
 
 def srdf_postures(srdf: str | None) -> dict[str, dict[str, float]]:
@@ -208,16 +223,3 @@ def _neighbours_before(model: pin.Model, shaped: set[int]) -> list[int]:
         else:
             before[joint] = parent
     return before
-
-
-def _random_configuration(model: pin.Model, random: np.random.Generator) -> Array:
-    # pin.randomConfiguration draws from a global seed and fails on unbounded joints.
-    q = np.zeros(model.nq)
-    limits = np.clip([model.lowerPositionLimit, model.upperPositionLimit], -_FARTHEST, _FARTHEST)
-    for joint in list(model.joints)[1:]:
-        if joint.nq == 2:
-            angle = random.uniform(-np.pi, np.pi)
-            q[joint.idx_q : joint.idx_q + 2] = np.cos(angle), np.sin(angle)
-        else:
-            q[joint.idx_q] = random.uniform(*limits[:, joint.idx_q])
-    return q

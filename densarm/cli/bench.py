@@ -34,7 +34,7 @@ def bench() -> None:
 
 @bench.command()
 @click.option("--arm", default="panda", show_default=True, help="A name of `densarm list`.")
-@choice_option("--shapes", ["hull", "capsule"], "The arm's collision geometry.")
+@choice_option("--shapes", ["hull", "pieces", "capsule"], "The arm's collision geometry.")
 @number_option("--pairs", 64, "Geometry pairs: arm to sphere, filled up by the arm's own.")
 @number_option("--steps", 20_000, "Steps to be timed, at 1 kHz along a motion.")
 @output_option("--json", "FILE", "Write the result as JSON.")

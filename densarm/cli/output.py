@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from densarm.values.files import atomic_file
+from densarm.values.files import atomic_file, on_waiting
 from densarm.values.outcome import Outcome
 
 if TYPE_CHECKING:
@@ -33,7 +33,7 @@ def progress() -> Iterator[Callable[[str], None]]:
         return
     from rich.console import Console
 
-    with Console().status("starting") as status:
+    with Console().status("starting") as status, on_waiting(status.update):
         yield status.update
 
 

@@ -247,7 +247,7 @@ class _RobotTable:
     cut_joints: tuple[str, ...] = ()
     base_placement: tuple[float, float, float, float, float, float, float] | None = None
     acceleration: tuple[float, ...] | None = None
-    shapes: str = "hull"
+    shapes: str | None = None
     collision_from_visual: str | None = None
     inertia: str | None = None
     density: float | None = None

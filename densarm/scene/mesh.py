@@ -104,14 +104,20 @@ class Mesh(Obstacle):
             raise FileContentError(self.path, str(error)) from None
 
 
+def indexed_triangles(mesh: coal.BVHModelBase) -> tuple[Array, NDArray[np.int64]]:
+    """Return vertices (V, 3) [m] and the indices of the three of each triangle (N, 3)."""
+    corners = map(mesh.tri_indices, range(mesh.num_tris))
+    triangles = np.array([[corner[i] for i in range(3)] for corner in corners], dtype=np.int64)
+    return np.array(mesh.vertices()), triangles
+
+
 def hull_corners(points: Array, name: str = "a piece") -> tuple[tuple[float, ...], ...]:
     """Return the corners of the convex hull of points (N, 3) [m], which must span a volume."""
     return tuple(map(tuple, np.array(convex_hull(points, name).points()).tolist()))
 
 
 def _enclosing_pieces(mesh: coal.BVHModelBase) -> Pieces:
-    vertices, corners = np.array(mesh.vertices()), map(mesh.tri_indices, range(mesh.num_tris))
-    triangles = np.array([[corner[i] for i in range(3)] for corner in corners], dtype=np.int64)
+    vertices, triangles = indexed_triangles(mesh)
     if not _is_closed(triangles):
         reason = "the mesh is not closed, or its faces point in and out: mend it, or use 'hull'"
         raise DensarmError(reason)

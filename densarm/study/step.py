@@ -91,7 +91,7 @@ def time_step(arm: str, shapes: str = "hull", pairs: int = 64, steps: int = 20_0
 
     Args:
         arm: a known name.
-        shapes: "hull" or "capsule".
+        shapes: "hull", "pieces" or "capsule".
         pairs: geometry pairs: arm to sphere, filled up by the arm's own.
         steps: number of steps to be timed.
 
@@ -184,7 +184,8 @@ def world_among_spheres(arm: Arm, motion: Motion, pairs: int) -> World:
         InvalidValueError: a number of pairs that the arm cannot have.
     """
     geometry = arm.collision_model
-    moving = sum(item.parentJoint > 0 for item in geometry.geometryObjects)
+    whole = [item for item in geometry.geometryObjects if item.name not in arm.self_pieces]
+    moving = sum(item.parentJoint > 0 for item in whole)
     own = [(pair.first, pair.second) for pair in geometry.collisionPairs]
     n_spheres, n_own = divmod(pairs, moving)
     if n_own > len(own):

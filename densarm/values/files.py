@@ -5,14 +5,19 @@ import re
 import sys
 import tempfile
 import tomllib
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from functools import cache
+from hashlib import sha256
 from pathlib import Path
 from threading import RLock
 from typing import Any, BinaryIO, TextIO
+from zipfile import BadZipFile
+
+import numpy as np
 
 from densarm.errors import FileContentError
+from densarm.values.arrays import Array
 
 MAX_BYTES = 20_000_000
 """Size of the largest text file that is read."""
@@ -62,6 +67,42 @@ def atomic_file(path: Path) -> Iterator[BinaryIO]:
         raise FileContentError(path, f"cannot be written: {error.strerror}") from None
     finally:
         Path(temporary).unlink(missing_ok=True)
+
+
+_waits: list[Callable[[str], object]] = []
+
+
+@contextmanager
+def on_waiting(tell: Callable[[str], object]) -> Iterator[None]:
+    """Call `tell` with a phrase before anything that is computed once on a machine."""
+    _waits.append(tell)
+    try:
+        yield
+    finally:
+        _waits.remove(tell)
+
+
+def kept_arrays(key: str, compute: Callable[[], dict[str, Array]], doing: str) -> dict[str, Array]:
+    """Return arrays by name, computed once on this machine for a key that tells all they depend on.
+
+    They are kept where numba keeps kernels if ``NUMBA_CACHE_DIR`` says so, or else in the user's
+    folder for caches; where neither can be written to, they are computed each time. `on_waiting`
+    tells of it by the phrase.
+    """
+    # Not Path.expanduser, which raises where the user has no home.
+    caches = os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")  # noqa: PTH111
+    folder = Path(os.environ.get("NUMBA_CACHE_DIR") or Path(caches, "densarm"))
+    path = folder / f"densarm-{sha256(key.encode()).hexdigest()}.npz"
+    with suppress(OSError, ValueError, EOFError, BadZipFile), path.open("rb") as file:
+        return dict(np.load(file))
+    for tell in _waits:
+        tell(doing)
+    arrays = compute()
+    with suppress(OSError, FileContentError):
+        folder.mkdir(parents=True, exist_ok=True)
+        with atomic_file(path) as file:
+            np.savez(file, **arrays)  # type: ignore[arg-type]
+    return arrays
 
 
 @contextmanager

@@ -59,7 +59,8 @@ def arm_bodies(arm: Arm) -> tuple[Body, ...]:
     """Return the visual geometry of an arm, and the collision geometry of links without one."""
     visual = list(arm.visual_model.geometryObjects)
     seen = {item.parentFrame for item in visual}
-    plain = [item for item in arm.collision_model.geometryObjects if item.parentFrame not in seen]
+    whole = [x for x in arm.collision_model.geometryObjects if x.name not in arm.self_pieces]
+    plain = [item for item in whole if item.parentFrame not in seen]
     return tuple(_body(item, tuple(item.meshColor[:3].tolist())) for item in visual + plain)
 
 

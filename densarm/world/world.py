@@ -235,7 +235,11 @@ def _geometry_model(arm: Arm, scene: Scene) -> pin.GeometryModel:
             name, allowed = attachment.body.name, "held by the arm: arm.holding(*scene.attachments)"
             raise InvalidValueError("attached body", name, allowed)
     model = arm.collision_model.copy()
-    moving = [k for k, item in enumerate(model.geometryObjects) if item.parentJoint > 0]
+    moving = [
+        k
+        for k, item in enumerate(model.geometryObjects)
+        if item.parentJoint > 0 and item.name not in arm.self_pieces
+    ]
     for item in [x for obstacle in scene for x in geometry_objects(obstacle, origin=arm.origin)]:
         if model.existGeometryName(item.name):
             allowed = f"other than the names of the shapes of {arm.name!r}"

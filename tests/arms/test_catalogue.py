@@ -4,6 +4,7 @@ from functools import cache
 from itertools import combinations
 
 import numpy as np
+import pinocchio as pin
 import pytest
 
 from densarm.arms.arm import Arm, load_arm
@@ -22,8 +23,8 @@ from densarm.world.world import World
 
 loaded = cache(load_arm)
 
-# Meshes of many triangles take seconds to load.
-LARGE = {"so101", "z1"}
+# Meshes of many triangles take seconds to load, and the first time to cut into pieces.
+LARGE = {"kinova", "so100", "so101", "z1"}
 SLOW = [pytest.param(name, marks=pytest.mark.slow) for name in sorted(LARGE)]
 
 
@@ -61,22 +62,32 @@ def test_end_effector_moves_with_the_last_joint(arm: Arm) -> None:
     assert arm.model.frames[arm.end_effector_frame].parentJoint == arm.model.njoints - 1
 
 
+def whole_shapes(arm: Arm) -> list[pin.GeometryObject]:
+    return [x for x in arm.collision_model.geometryObjects if x.name not in arm.self_pieces]
+
+
+def checked_pairs(arm: Arm) -> set[frozenset[str]]:
+    """Pairs of whole shapes, a piece counting as what it is of."""
+    whole = {name: name.rpartition(".")[0] for name in arm.self_pieces}
+    pairs = World(arm, Scene([])).pairs
+    return {frozenset(whole.get(name, name) for name in pair) for pair in pairs}
+
+
 def test_every_two_shapes_that_move_against_each_other_are_checked_or_listed(arm: Arm) -> None:
-    items = list(arm.collision_model.geometryObjects)
     moving = {
         frozenset((a.name, b.name))
-        for a, b in combinations(items, 2)
+        for a, b in combinations(whole_shapes(arm), 2)
         if a.parentJoint != b.parentJoint
     }
-    checked = {frozenset(pair) for pair in World(arm, Scene([])).pairs}
+    checked = checked_pairs(arm)
     left_out = {frozenset(pair.shapes) for pair in arm.excluded_pairs}
     assert checked | left_out == moving
     assert not checked & left_out
 
 
 def test_outline_without_meshes_is_that_of_the_arm(arm: Arm) -> None:
-    moving = [item for item in arm.collision_model.geometryObjects if item.parentJoint > 0]
-    own, left_out = len(arm.collision_model.collisionPairs), len(arm.excluded_pairs)
+    moving = [item for item in whole_shapes(arm) if item.parentJoint > 0]
+    own, left_out = len(checked_pairs(arm)), len(arm.excluded_pairs)
     assert robot_outline(arm.description) == (arm.nv, len(moving), own, left_out)
 
 
@@ -101,6 +112,6 @@ def test_catalogue() -> None:
     assert {"swing_up", "panda_table", "panda_shelf"} <= set(scenario_paths())
     for name in robot_names():
         assert (robots_folder() / name / "arm.toml").is_file()
-        assert Arm(robot_description(name)).name == name
+        assert loaded(name).name == name
     with pytest.raises(UnknownNameError, match=r"'tow_link'; did you mean 'two_link'"):
         robot_description("tow_link")

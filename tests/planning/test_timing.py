@@ -1,7 +1,7 @@
 """Timing: rest to rest, within every limit's share, or an error that says why not."""
 
 import re
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 
 import numpy as np
@@ -111,7 +111,7 @@ def test_a_motion_where_topp_ra_fails(timed: Timed, monkeypatch: pytest.MonkeyPa
         time_path(arm, path, 3.0, PERIOD, TimingParameters(torque_share=0.01))
 
 
-known_arm = cache(load_arm)
+known_arm = cache(partial(load_arm, shapes="capsule"))
 
 
 @pytest.mark.slow
@@ -125,7 +125,7 @@ def test_the_shortest_ways_are_timed_within_the_limits(
     name: str, exponent: float, direction: list[float]
 ) -> None:
     arm = known_arm(name)
-    middle = arm.angles(arm.postures["neutral"])
+    middle = arm.angles(arm.postures["ready"])
     step = 10.0**exponent * (np.array(direction[: arm.nv]) + np.eye(arm.nv)[0] * 0.1)
     path = SmoothPath(
         np.repeat([0.0, 1.0], 4), middle + np.linspace(0.0, 1.0, 4)[:, np.newaxis] * step

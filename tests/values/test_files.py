@@ -5,10 +5,19 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from densarm.errors import FileContentError
-from densarm.values.files import atomic_file, captured_stderr, read_text, read_toml
+from densarm.values.arrays import Array
+from densarm.values.files import (
+    atomic_file,
+    captured_stderr,
+    kept_arrays,
+    on_waiting,
+    read_text,
+    read_toml,
+)
 
 
 def test_file_appears_when_it_is_whole(tmp_path: Path) -> None:
@@ -157,3 +166,31 @@ def test_a_missing_toml_file_is_called_missing(tmp_path: Path) -> None:
     with pytest.raises(FileContentError) as caught:
         read_toml(tmp_path / "none.toml")
     assert str(caught.value) == f"{tmp_path / 'none.toml'}: No such file or directory"
+
+
+def test_arrays_are_computed_once_for_a_key(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.delenv("NUMBA_CACHE_DIR", raising=False)
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    asked: list[str] = []
+
+    def array(key: str) -> float:
+        def compute() -> dict[str, Array]:
+            asked.append(key)
+            return {"x": np.full(2, float(len(asked)))}
+
+        return float(kept_arrays(key, compute, f"computing {key}")["x"][1])
+
+    told: list[str] = []
+    with on_waiting(told.append):
+        assert [array("a"), array("b"), array("a")] == [1.0, 2.0, 1.0]
+    assert told == ["computing a", "computing b"]
+    for file in (tmp_path / "densarm").iterdir():
+        file.write_bytes(b"PK broken")
+    assert array("a") == 3.0
+    assert array("a") == 3.0
+    elsewhere = tmp_path / "a file"
+    elsewhere.touch()
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(elsewhere))
+    assert [array("a"), array("a")] == [4.0, 5.0]  # nowhere to keep them

@@ -95,7 +95,7 @@ def test_camera_does_not_step_back_for_a_half_space(resting: Run) -> None:
 
 @pytest.mark.slow
 def test_end_effector_may_share_its_name_with_a_joint(resting: Run) -> None:
-    arm = load_arm("z1")
+    arm = load_arm("z1", shapes="capsule")
     ready = arm.postures["ready"]
     task = replace(resting.task, arm=arm, start=ready, goal=ready)
     row = np.zeros((1, arm.nv))
