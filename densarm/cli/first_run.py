@@ -48,7 +48,8 @@ def compile_meanwhile() -> None:
     from densarm.visualization.rasterizer import Rasterizer
 
     scenario = load_scenario("swing_up")
-    run(replace(scenario, goal=scenario.start), guide=_Stay())
+    control = replace(scenario.control, path_margin=0.0)
+    run(replace(scenario, goal=scenario.start, control=control), guide=_Stay())
     corners = np.eye(3)
     picture = Rasterizer(Camera.facing(corners), 8, 8)
     picture.lines(corners[np.newaxis, :2], color=(0.0, 0.0, 0.0), width=1.0, opacity=1.0)

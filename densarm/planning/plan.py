@@ -247,6 +247,8 @@ def _searched(
 
 def _kept_along(check: SweptCheck, points: Array, kept: Array) -> Array:
     """Return how much of what pairs shall keep (K,) [m] is proved along a polyline (N, nq)."""
+    if not kept.any():
+        return kept
     met = np.min([check.distance_margin(q) for q in points], axis=0)
     kept = np.clip(met, 0.0, kept)
     for _ in range(_HALVINGS):

@@ -12,6 +12,7 @@ from densarm.values.arrays import Array
 from densarm.values.kernels import compiled, compiled_part
 
 _SPACINGS = 0.5, 0.3  # [rad or m] at most between points that tries start and end at, in turn
+_HALF_TURN = math.pi - 1e-9  # [rad], beyond which rounding decides which way round a proof goes
 _LEAST_GAIN = 3e-4  # of a path's length; a try that gains less is not worth a check
 
 
@@ -68,7 +69,7 @@ def _resampled(arm: Arm, path: Array, spacing: float) -> Array:
     steps = arm.difference(path[:-1], path[1:])
     parts = np.maximum(1, np.ceil(_length(steps) / spacing).astype(int))
     pieces = [
-        arm.integrate(q, np.arange(n)[:, np.newaxis] / n * step)
+        np.vstack([q, arm.integrate(q, np.arange(1, n)[:, np.newaxis] / n * step)])
         for q, step, n in zip(path, steps, parts, strict=False)
     ]
     return np.vstack([*pieces, path[-1:]])
@@ -111,6 +112,8 @@ def _write_way(
     for j in range(nv):
         if (j == joint or joint == nv) and longer > 0.0:
             chord = _turn(angles[end, j] - angles[begin, j], is_continuous[j])
+            if is_continuous[j] and abs(chord) > _HALF_TURN:
+                return 0.0
             for k in range(1, n + 1):
                 out[k, j] = out[0, j] + share[k] / longer * chord
     for k in range(n):

@@ -23,6 +23,7 @@ KEYS = [
     "min_clearance_m",
     "goal_error_rad",
     "peak_torque_ratio",
+    "led_by",
     "plan_time_s",
     "preparation_time_s",
     "certified",

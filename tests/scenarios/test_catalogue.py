@@ -38,7 +38,7 @@ def test_scenario_has_a_title_obstacles_and_default_control(scenario: Scenario) 
     assert scenario.title != scenario.name
     assert len(scenario.scene) > 0
     assert scenario.control.form == ControlForm.TRACKING
-    assert scenario.control.guide == "path"
+    assert scenario.control.guide == ("direct" if "swing_up" in scenario.name else "auto")
 
 
 def test_start_and_goal_are_clear_and_the_straight_segment_is_not(scenario: Scenario) -> None:
