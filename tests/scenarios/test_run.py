@@ -21,7 +21,7 @@ from densarm.planning.guide import GuidePath, NoPath
 from densarm.planning.motion import PlanningError
 from densarm.planning.plan import plan_motion
 from densarm.scenarios.run import Drive, by_density, records, run, run_by
-from densarm.scenarios.scenario import ControlForm, Scenario, load_scenario
+from densarm.scenarios.scenario import ControlForm, ControlParameters, Scenario, load_scenario
 from densarm.scene.obstacles import Box, Sphere
 from densarm.scene.scene import Scene
 from densarm.simulation.plants import PinocchioPlant
@@ -386,6 +386,7 @@ class PushedPlant(PinocchioPlant):
 
 @pytest.mark.slow
 def test_an_arm_pushed_off_its_plan_reaches_the_goal(swing_up: Scenario, tmp_path: Path) -> None:
+    swing_up = replace(swing_up, control=ControlParameters(guide="path"))
     drive = by_density(swing_up)
     plant = PushedPlant(swing_up.arm)
     done = simulate_task(swing_up.task, swing_up.world, drive.controller, plant)

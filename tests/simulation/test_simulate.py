@@ -205,7 +205,7 @@ def test_a_supervised_run_is_judged_as_the_controllers_own(swing_up: Scenario) -
         )
     )
     assert run.outcome == Outcome.STUCK
-    assert run.detail.startswith("saddle of the density")
+    assert run.detail.startswith("maximum of the density")
     assert run.tracking_error is None
     assert_judged_alike(run, supervised)
 
@@ -432,7 +432,7 @@ def test_a_velocity_controller_drives_the_single_integrator(free: World) -> None
 
 def velocity_run(scenario: Scenario, **changes: Any) -> Run:
     world, start, goal = scenario.world, scenario.start, scenario.goal
-    controller = DensityRegulation(world, goal, path=plan_path(world, start, goal).path)
+    controller = DensityRegulation(world, goal, path=plan_path(world, start, goal, "path").path)
     plant, p = SingleIntegrator(scenario.arm, 0.02, **changes), Parameters(dt=0.02, time_limit=10)
     return simulate(world, controller, start, plant=plant, parameters=p)
 
