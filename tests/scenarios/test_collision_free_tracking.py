@@ -32,9 +32,8 @@ JERK_TIME = 0.025  # [s], 1 / K_v
 
 def configured(name: str, form: ControlForm) -> Scenario:
     scenario = load_scenario(name)
-    # Without a clock the swing-up's elbow, whose weight is small, would settle after 34 s, and in the
-    # plain form, whose V has no weights, not at all.
-    guide = "auto" if form in REGULATIONS else scenario.control.guide
+    # The plain form's V has no weights, without which the density alone is stuck in swing_up.
+    guide = "auto" if form == ControlForm.PLAIN else scenario.control.guide
     return replace(
         scenario,
         control=replace(scenario.control, form=form, guide=guide),
