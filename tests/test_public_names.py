@@ -53,7 +53,7 @@ def test_rooms_list_what_the_paper_has_beside_the_public_names(room: str, names:
     assert not modules & set(package.__all__)
     for name in package.__all__:
         assert getattr(package, name).__doc__
-    departures = (Path(densarm.__file__).parents[1] / "docs" / "departures.md").read_text("utf-8")
+    departures = (Path(__file__).parents[1] / "docs" / "departures.md").read_text("utf-8")
     assert all(f"`densarm.{room}.{name}`" in departures for name in names)
 
 

@@ -12,7 +12,8 @@ def list_known() -> None:
     Pairs are the geometry pairs whose distances are computed, of the robot with itself and with
     the scenario's obstacles. Two links that move against each other are left out where they are
     neighbours, where the robot's SRDF says so, and where they always collide; in Python,
-    `load_arm(name).excluded_pairs` tells which and why.
+    `load_arm(name).excluded_pairs` tells which and why. Links count as one hull each; of those that
+    are made of convex pieces more pairs are queried, and fewer left out.
 
     \b
     Example:

@@ -13,6 +13,7 @@ from densarm.values.kernels import compiled, compiled_part
 
 _SPACINGS = 0.5, 0.3  # [rad or m] at most between points that tries start and end at, in turn
 _HALF_TURN = math.pi - 1e-9  # [rad], beyond which rounding decides which way round a proof goes
+_IN_VAIN = 100  # tries that gain nothing, after which no more are made
 _LEAST_GAIN = 3e-4  # of a path's length; a try that gains less is not worth a check
 
 
@@ -46,7 +47,11 @@ def _straightened(
     """Return what is left of the points of a path (W, nq) once ways between them are shorter."""
     angles, is_continuous = arm.angles(points), arm.continuous
     least = _LEAST_GAIN * _length(arm.difference(points[:-1], points[1:])).sum()
+    in_vain = 0
     for _ in range(tries):
+        if in_vain == _IN_VAIN:
+            break
+        in_vain += 1
         joint = int(rng.integers(arm.nv + 1))
         begin, end = (int(index) for index in np.sort(rng.integers(len(points), size=2)))
         way = np.empty((end - begin + 1, arm.nv))
@@ -57,6 +62,7 @@ def _straightened(
         checked = candidate[[0, -1]] if joint == arm.nv else candidate
         if all(freedom.segment_is_clear(a, b) for a, b in pairwise(checked)):
             points[begin : end + 1], angles[begin : end + 1] = candidate, way
+            in_vain = 0
     kept = [points[0]]
     for waypoint, after in pairwise(points[1:]):
         if not freedom.segment_is_clear(kept[-1], after):

@@ -11,13 +11,13 @@ from functools import cache
 from hashlib import sha256
 from pathlib import Path
 from threading import RLock
-from typing import Any, BinaryIO, TextIO
+from typing import TYPE_CHECKING, Any, BinaryIO, TextIO
 from zipfile import BadZipFile
 
-import numpy as np
-
 from densarm.errors import FileContentError
-from densarm.values.arrays import Array
+
+if TYPE_CHECKING:
+    from densarm.values.arrays import Array
 
 MAX_BYTES = 20_000_000
 """Size of the largest text file that is read."""
@@ -82,13 +82,17 @@ def on_waiting(tell: Callable[[str], object]) -> Iterator[None]:
         _waits.remove(tell)
 
 
-def kept_arrays(key: str, compute: Callable[[], dict[str, Array]], doing: str) -> dict[str, Array]:
+def kept_arrays(
+    key: str, compute: Callable[[], dict[str, "Array"]], doing: str
+) -> dict[str, "Array"]:
     """Return arrays by name, computed once on this machine for a key that tells all they depend on.
 
     They are kept where numba keeps kernels if ``NUMBA_CACHE_DIR`` says so, or else in the user's
     folder for caches; where neither can be written to, they are computed each time. `on_waiting`
     tells of it by the phrase.
     """
+    import numpy as np  # for which the command line's help would wait
+
     # Not Path.expanduser, which raises where the user has no home.
     caches = os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")  # noqa: PTH111
     folder = Path(os.environ.get("NUMBA_CACHE_DIR") or Path(caches, "densarm"))

@@ -52,10 +52,14 @@ def test_start_and_goal_are_clear_and_the_straight_segment_is_not(scenario: Scen
 
 
 def test_it_is_listed_with_its_robot_joints_and_pairs(scenario: Scenario) -> None:
+    """Links in pieces, which take long to cut, count as their hulls: they have more pairs."""
     arm = scenario.arm
     own = len(arm.collision_model.collisionPairs)
     others = scenario.world.n_pairs - own
-    assert listed()[scenario.name] == [arm.name, *map(str, (arm.nv, own, others))]
+    name, joints, self_pairs, with_obstacles = listed()[scenario.name]
+    assert [name, joints, with_obstacles] == [arm.name, str(arm.nv), str(others)]
+    in_pieces = any("." in item.name for item in arm.collision_model.geometryObjects)
+    assert int(self_pairs) < own if in_pieces else int(self_pairs) == own
 
 
 def test_kinova_goes_the_short_way_round() -> None:
