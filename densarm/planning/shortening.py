@@ -13,7 +13,7 @@ from densarm.values.kernels import compiled, compiled_part
 
 _SPACINGS = 0.5, 0.3  # [rad or m] at most between points that tries start and end at, in turn
 _HALF_TURN = math.pi - 1e-9  # [rad], beyond which rounding decides which way round a proof goes
-_IN_VAIN = 100  # tries that gain nothing, after which no more are made
+_IN_VAIN = 150  # tries that gain nothing, after which no more are made
 _LEAST_GAIN = 3e-4  # of a path's length; a try that gains less is not worth a check
 
 

@@ -198,10 +198,10 @@ def test_a_supervised_run_is_judged_as_the_controllers_own(swing_up: Scenario) -
     assert run.outcome == Outcome.REACHED
     assert_judged_alike(run, simulate(world, Supervisor(arm, tracking), start))
     run, supervised = (
-        simulate(world, controller, start)
+        simulate(world, controller, start, parameters=Parameters(dt=0.005))
         for controller in (
-            DensityRegulation(world, swing_up.goal),
-            Supervisor(arm, DensityRegulation(world, swing_up.goal)),
+            DensityRegulation(world, swing_up.goal, period=0.005),
+            Supervisor(arm, DensityRegulation(world, swing_up.goal, period=0.005), 0.005),
         )
     )
     assert run.outcome == Outcome.STUCK

@@ -30,7 +30,8 @@ NAMES = ("density_direct", "potential_field")
 
 @pytest.fixture(scope="module")
 def comparison(swing_up: Scenario) -> Comparison:
-    return compare(swing_up, NAMES, starts=3, seed=4, tuning_starts=0)
+    short = replace(swing_up, simulation=replace(swing_up.simulation, time_limit=8.0))
+    return compare(short, NAMES, starts=3, seed=4, tuning_starts=0)
 
 
 @pytest.mark.slow
@@ -127,7 +128,7 @@ def runs_of_odd(monkeypatch: pytest.MonkeyPatch) -> Odd:
         seen.append((scenario.start.tolist(), scale, scenario))
         if scale != scales(3)[-1]:
             raise InvalidValueError("gain", 0.0, "positive")
-        return BASELINES["density_direct"](scenario)
+        return BASELINES["density"](scenario)
 
     monkeypatch.setattr("densarm.study.comparison.BASELINES", {"odd": odd})
     return seen
