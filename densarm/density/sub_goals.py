@@ -78,17 +78,18 @@ class SubGoals:
         arm = check.arm
         self._check = check
         self.q: Array = _refined(check, path) if path.is_clear else path.waypoints
-        self._margin = np.array([check.distance_margin(q) for q in self.q])
+        self.distance_margin: Array = np.array([check.distance_margin(q) for q in self.q])
+        """Distance of each pair beyond the margin at each sub-goal (W, K) [m]."""
         steps = np.linalg.norm(arm.difference(self.q[:-1], self.q[1:]), axis=1)
         self.remaining: Array = np.append(np.cumsum(steps[::-1])[::-1], 0.0)
         """Length of the way from each sub-goal to the goal (W,) [rad]."""
-        self.sensing_distance = np.full_like(self._margin, sensing.distance)
+        self.sensing_distance = np.full_like(self.distance_margin, sensing.distance)
         """Sensing distance of each pair on the way to each sub-goal (W, K) [m]."""
         self.joint_sensing_distance = np.full(arm.nv, sensing.joint)
         """Sensing distance of each joint's limits (nv,) [rad or m]."""
         if path.is_clear:
-            ends_twice = np.pad(self._margin, ((1, 1), (0, 0)), mode="edge")
-            near = np.minimum(self._margin, np.minimum(ends_twice[:-2], ends_twice[2:]))
+            ends_twice = np.pad(self.distance_margin, ((1, 1), (0, 0)), mode="edge")
+            near = np.minimum(self.distance_margin, np.minimum(ends_twice[:-2], ends_twice[2:]))
             np.minimum(sensing.path_share * near, sensing.distance, out=self.sensing_distance)
             angles = arm.angles(self.q)
             inside = np.minimum(angles - arm.limits.lower, arm.limits.upper - angles).min(axis=0)
@@ -125,7 +126,7 @@ class SubGoals:
         step = check.arm.difference(q, self.q[index])
         if np.abs(step).max() > SIGHT:
             return False
-        need = check.margin - self._margin[index] + 2.0 * self.sensing_distance[index]
+        need = check.margin - self.distance_margin[index] + 2.0 * self.sensing_distance[index]
         return all_exceed(distances, need + check.world.motion_bound(step))
 
 

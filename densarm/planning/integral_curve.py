@@ -12,6 +12,7 @@ from densarm.world.separating_planes import SeparatingPlanes
 _LONGEST_STEP = 0.3  # [rad]
 _SMALLEST_STEP = 1e-6  # [rad], below which a step makes no progress
 _ARRIVED = 1e-7  # [rad or m] from the goal in any joint
+_ROOM, _ROOM_SHARE = 2e-3, 0.5  # [m], of that at sub-goals: what steps keep, to be smoothed
 _GROWTH_SHARE = 0.1  # of Δᵀ∇ ln ρ, that ln ρ must grow by in a step Δ
 _MOST_STEPS = 1000
 _LEAVING = (0.1, 0.01, 1e-3)  # [rad] from a critical point, the longest that climbs
@@ -43,10 +44,10 @@ class PlanningSystem:
         A = \sum_k -\frac{\partial^2 \ln\Psi_k}{\partial h_k^2} \nabla h_k \nabla h_k^T,
 
     the time τ such that ‖Δ‖ is the length wanted, which is halved until ln ρ has grown by a share
-    of Δᵀ∇ ln ρ and the segment is proved clear beyond the margin. A step that is long enough for
-    the goal goes there, where ρ is infinite. Where nothing is sensed on the segment to a sub-goal,
-    that segment is the step. A curve that can no longer climb has met a critical point, and leaves
-    it along the unstable direction, where it has one.
+    of Δᵀ∇ ln ρ and the segment is proved clear, with a little room beyond the margin. A step that
+    is long enough for the goal goes there, where ρ is infinite. Where nothing is sensed on the
+    segment to a sub-goal, that segment is the step. A curve that can no longer climb has met a
+    critical point, and leaves it along the unstable direction, where it has one.
 
     Args:
         guided: the density; its sub-goals may be changed between two curves.
@@ -60,6 +61,7 @@ class PlanningSystem:
         self.guided = guided
         self._arm = guided.world.arm
         sensed = float(guided.sub_goals.sensing_distance.max(initial=0.0))
+        self._margin = margin
         self._clear = SeparatingPlanes(guided.world, margin)
         self._unsensed = SeparatingPlanes(guided.world, margin, sensed)
         self._gradient = np.empty(self._arm.nv)
@@ -70,6 +72,8 @@ class PlanningSystem:
         guided = self.guided
         guided.restart()
         goals, density = guided.sub_goals, guided.density
+        room = np.clip(_ROOM_SHARE * goals.distance_margin.min(axis=0), 0.0, _ROOM)
+        self._clear = SeparatingPlanes(guided.world, self._margin, room)
         points, q, length, left = [start], start, _LONGEST_STEP, list[str]()
         for _ in range(_MOST_STEPS):
             guided.update(q)
