@@ -20,7 +20,6 @@ import numpy as np
 
 import densarm
 from densarm.cli.bench import print_problem_sets
-from densarm.density.goal_distance import TorusDistance
 from densarm.planning.density_guide import Legs
 from densarm.planning.plan import GUIDES, plan_path
 from densarm.study.problems import ProblemResult, ProblemResults, in_processes, problem_result
@@ -37,7 +36,7 @@ def run(name: str, guide: str | None, item: tuple[int, np.ndarray]) -> ProblemRe
 def curves(scenario: densarm.Scenario, starts: list[np.ndarray]) -> int:
     """Print how many curves of the density reach the goal, and why the others do not."""
     control, check = scenario.control, SweptCheck(scenario.world, scenario.control.margin)
-    distance = TorusDistance(scenario.arm, scenario.density.weights, control.kappa)
+    distance = scenario.goal_distance
     density = replace(scenario.density, alpha=control.planning_alpha)
     legs, reached, left = Legs(check, distance, density, scenario.sensing), 0, 0
     for start in starts:

@@ -12,13 +12,7 @@ from numpy.typing import ArrayLike
 from densarm.arms.joint_space import ConfigurationSpace
 from densarm.density.goal_distance import GoalDistance, TorusDistance, checked_weights
 from densarm.density.inverse_bump import smooth_step
-from densarm.density.unsafe_sets import (
-    ClearanceSet,
-    Curved,
-    JointLimitSet,
-    SensingParameters,
-    UnsafeSet,
-)
+from densarm.density.unsafe_sets import Curved, SensingParameters, UnsafeSet, sensed_sets
 from densarm.errors import InvalidValueError
 from densarm.values.arrays import Array
 from densarm.values.checks import non_negative, one_of, positive
@@ -301,10 +295,7 @@ def density_towards(
 
     Source: [ZNV] eq. 4.
     """
-    unsafe: list[UnsafeSet] = [
-        ClearanceSet(world, margin, sensing.distance),
-        JointLimitSet(world.arm, sensing.joint),
-    ]
+    unsafe = sensed_sets(world, margin, sensing)
     distance = goal_distance or TorusDistance(world.arm, parameters.weights, kappa)
     return NavigationDensity(world.arm, goal, unsafe, distance, parameters)
 

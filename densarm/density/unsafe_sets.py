@@ -192,6 +192,23 @@ class JointLimitSet:
             out[joint, joint] += bump_curvature(h_k, width_k, theta)
 
 
+def sensed_sets(
+    world: World, margin: float, sensing: SensingParameters
+) -> tuple[ClearanceSet, JointLimitSet]:
+    """Return the pairs of a world and the limits of its joints, sensed as far as they may be.
+
+    Args:
+        world: the pairs, and the arm.
+        margin: safety margin m of the pairs [m].
+        sensing: sensing distances.
+
+    Raises:
+        InvalidValueError: a negative margin.
+    """
+    pairs = ClearanceSet(world, margin, sensing.distance)
+    return pairs, JointLimitSet(world.arm, sensing.joint)
+
+
 class ImplicitSet:
     r"""The set {h ≤ 0} in Rⁿ with the sensing region {s ≤ 0}, both given as functions.
 
@@ -266,7 +283,8 @@ def _add_active_curvature(
             continue
         curvature = bump_curvature(rows[k, 0] - margin, width[k], theta)
         if curvature > 0.0:
-            gradient[:] = 0.0
+            for i in range(out.shape[0]):
+                gradient[i] = 0.0
             add_pair_gradient(rows[k], jacobian, sign[k], 1.0, gradient)
             for i in range(out.shape[0]):
                 for j in range(out.shape[0]):

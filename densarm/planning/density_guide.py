@@ -109,7 +109,7 @@ class DensityGuide:
         return GuidePath(path, is_clear=True, found_by=found_by, stuck=stuck)
 
     def _room(self, q: Array) -> float:
-        return float(self._legs.check.distance_margin(q).min(initial=np.inf))
+        return self._legs.check.least_distance_margin(q[np.newaxis])
 
     def _by_via_point(
         self, first: Array, last: Array, bounds: SamplingBounds, rng: np.random.Generator

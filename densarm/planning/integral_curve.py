@@ -62,7 +62,6 @@ class PlanningSystem:
         self._arm = guided.world.arm
         sensed = float(guided.sub_goals.sensing_distance.max(initial=0.0))
         self._margin = margin
-        self._clear = SeparatingPlanes(guided.world, margin)
         self._unsensed = SeparatingPlanes(guided.world, margin, sensed)
         self._gradient = np.empty(self._arm.nv)
         self._curvature = np.empty((self._arm.nv, self._arm.nv))
@@ -73,7 +72,7 @@ class PlanningSystem:
         guided.restart()
         goals, density = guided.sub_goals, guided.density
         room = np.clip(_ROOM_SHARE * goals.distance_margin.min(axis=0), 0.0, _ROOM)
-        self._clear = SeparatingPlanes(guided.world, self._margin, room)
+        clear = SeparatingPlanes(guided.world, self._margin, room)
         points, q, length, left = [start], start, _LONGEST_STEP, list[str]()
         for _ in range(_MOST_STEPS):
             guided.update(q)
@@ -84,11 +83,11 @@ class PlanningSystem:
             is_critical = guided.is_critical()
             q_next = None if is_critical else self._in_sight(q, error)
             if q_next is None and not is_critical:
-                q_next = self._step(q, error, min(_LONGEST_STEP, 2.0 * length))
+                q_next = self._step(q, error, min(_LONGEST_STEP, 2.0 * length), clear)
                 if q_next is not None:
                     length = float(np.linalg.norm(self._arm.difference(q, q_next)))
             if q_next is None:
-                q_next, how = self._leave(q)
+                q_next, how = self._leave(q, clear)
                 if q_next is None:
                     break
                 left.append(how)
@@ -116,11 +115,11 @@ class PlanningSystem:
         is_unsensed = self.guided.sub_goal_in_sight(q) is not None
         return goal if is_unsensed or self._unsensed.segment_is_clear(q, goal) else None
 
-    def _step(self, q: Array, error: Array, length: float) -> Array | None:
+    def _step(self, q: Array, error: Array, length: float, clear: SeparatingPlanes) -> Array | None:
         """Return the next point, at most so far [rad], or None where ρ grows no more."""
         density, gradient = self.guided.density, self._gradient
         left = float(np.linalg.norm(error))
-        if left <= length and self._clear.segment_is_clear(q, density.goal):
+        if left <= length and clear.segment_is_clear(q, density.goal):
             return density.goal.copy()
         density.write_gradient(Gauge.LOG, gradient)
         density.write_curvature(q, self._curvature)
@@ -132,14 +131,14 @@ class PlanningSystem:
             candidate = self._arm.integrate(q, step)
             density.update(candidate)
             grown = density.log_value() - before
-            if grown > _GROWTH_SHARE * float(gradient @ step) and self._clear.segment_is_clear(
+            if grown > _GROWTH_SHARE * float(gradient @ step) and clear.segment_is_clear(
                 q, candidate
             ):
                 return candidate
             length *= 0.5
         return None
 
-    def _leave(self, q: Array) -> tuple[Array | None, str]:
+    def _leave(self, q: Array, clear: SeparatingPlanes) -> tuple[Array | None, str]:
         """Return a point away from the critical point q (nq,), if there is one, and how."""
         guided, density = self.guided, self.guided.density
         density.update(q)
@@ -149,7 +148,7 @@ class PlanningSystem:
         for length in _LEAVING:
             candidate = self._arm.integrate(q, length * direction)
             density.update(candidate)
-            if density.log_value() > before and self._clear.segment_is_clear(q, candidate):
+            if density.log_value() > before and clear.segment_is_clear(q, candidate):
                 return candidate, guided.describe_departure(q, direction)
         return None, ""
 

@@ -116,9 +116,7 @@ def plan_motion(
         PlanningError: there is no motion, with the outcome and the reason.
         InvalidValueError: no configuration, an unknown guide, or a value out of its range.
     """
-    check = SweptCheck(world, margin)
-    distance = TorusDistance(world.arm, density.weights, kappa)
-    legs = Legs(check, distance, replace(density, alpha=alpha), sensing)
+    legs = _legs(world, margin, density, alpha, kappa, sensing)
     planned = _planned(legs, start, goal, guide, seed, path_margin, search)
     points, kept, stuck, remark = planned.path.waypoints, planned.kept, "", ""
     if not planned.path.is_clear:
@@ -126,7 +124,8 @@ def plan_motion(
         # No more than the density would: where nothing is sensed it leads straight.
         space, rng = SeparatingPlanes(world, margin, sensing.distance), np.random.default_rng(seed)
         points = shortened(world.arm, space, curve.q, search.shortcuts, rng)
-        kept, stuck, remark = _kept_along(check, points, kept), legs.why_stuck(curve), curve.remark
+        kept = _kept_along(legs.check, points, kept)
+        stuck, remark = legs.why_stuck(curve), curve.remark
     points, kept = np.vstack([start, points]), _SMOOTH_SHARE * kept
     motion = replace(
         _timed(world, margin, kept, points, period, timing, time_limit),
@@ -160,9 +159,20 @@ def plan_path(
 
     Args and errors as for `plan_motion`.
     """
-    distance = TorusDistance(world.arm, density.weights, kappa)
-    legs = Legs(SweptCheck(world, margin), distance, replace(density, alpha=alpha), sensing)
+    legs = _legs(world, margin, density, alpha, kappa, sensing)
     return _planned(legs, start, goal, guide, seed, path_margin, search)
+
+
+def _legs(
+    world: World,
+    margin: float,
+    density: DensityParameters,
+    alpha: float,
+    kappa: float,
+    sensing: SensingParameters,
+) -> Legs:
+    distance = TorusDistance(world.arm, density.weights, kappa)
+    return Legs(SweptCheck(world, margin), distance, replace(density, alpha=alpha), sensing)
 
 
 def _planned(
@@ -193,23 +203,23 @@ def _planned(
         path = GuidePath(ends, is_clear=False, found_by=ALONE)
         return PlannedPath(path, kept, 0.0)
     began = time.perf_counter()
-    answer: GuidePath | NoPath
-    if guide == "path":
-        path, kept = _searched(check, depart, arrive, path_margin, least, search, seed)
-    elif isinstance(guide, str):
-        space = SeparatingPlanes(world, margin, kept)
-        answer = DensityGuide(legs, space, search).plan(depart, arrive, seed)
-        if isinstance(answer, GuidePath):
-            path, kept = answer, _kept_along(check, answer.waypoints, kept)
-        elif guide == "density":
-            raise PlanningError(Outcome.STUCK, answer.reason)
-        else:
-            path, kept = _searched(check, depart, arrive, path_margin, least, search, seed)
-            path = replace(path, stuck=answer.reason)
-    else:
+    if not isinstance(guide, str):
         path = _checked(arm, guide.plan(depart, arrive, seed), depart, arrive)
         if path.is_clear:
             kept = _kept_along(check, path.waypoints, kept)
+        return PlannedPath(path, kept, time.perf_counter() - began)
+    stuck = ""
+    if guide != "path":
+        space = SeparatingPlanes(world, margin, kept)
+        answer = DensityGuide(legs, space, search).plan(depart, arrive, seed)
+        if isinstance(answer, GuidePath):
+            kept = _kept_along(check, answer.waypoints, kept)
+            return PlannedPath(answer, kept, time.perf_counter() - began)
+        stuck = answer.reason
+        if guide == "density":
+            raise PlanningError(Outcome.STUCK, stuck)
+    path, kept = _searched(check, depart, arrive, path_margin, least, search, seed)
+    path = replace(path, stuck=stuck)
     return PlannedPath(path, kept, time.perf_counter() - began)
 
 

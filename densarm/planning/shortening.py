@@ -106,7 +106,8 @@ def _write_way(
     """
     n, nv = end - begin, angles.shape[1]
     share, longer, shorter = np.zeros(n + 1), 0.0, 0.0
-    out[0] = angles[begin]
+    for j in range(nv):  # to assign the row at once takes seconds to compile
+        out[0, j] = angles[begin, j]
     for k in range(n):
         square = 0.0
         for j in range(nv):

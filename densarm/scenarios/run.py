@@ -102,8 +102,9 @@ def run_by(
     if done.outcome == Outcome.INFEASIBLE:
         return done
     led_by, stuck = (drive.path.found_by, drive.path.stuck) if drive.path else ("", "")
-    done = replace(done, plan_time=drive.plan_time, preparation_time=elapsed)
-    return replace(done, led_by=led_by, stuck=stuck)
+    return replace(
+        done, plan_time=drive.plan_time, preparation_time=elapsed, led_by=led_by, stuck=stuck
+    )
 
 
 def by_density(scenario: Scenario, guide: Guide | None = None, *, replans: bool = True) -> Drive:
@@ -152,7 +153,6 @@ def _plan(scenario: Scenario, start: Array, guide: Guide | None) -> Drive:
     if control.form in {ControlForm.REGULATION, ControlForm.PLAIN}:
         planned = plan_path(world, start, goal, chosen, **search)
         is_plain = control.form == ControlForm.PLAIN
-        weighted = TorusDistance(scenario.arm, scenario.density.weights, control.kappa)
         regulation = DensityRegulation(
             world,
             goal,
@@ -161,7 +161,7 @@ def _plan(scenario: Scenario, start: Array, guide: Guide | None) -> Drive:
             margin=control.margin,
             gains=scenario.gains,
             period=period,
-            goal_distance=None if is_plain else weighted,
+            goal_distance=None if is_plain else scenario.goal_distance,
             speed=scenario.speed,
             **law,
         )

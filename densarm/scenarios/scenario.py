@@ -16,7 +16,7 @@ from densarm.certificates.task import Input, SimulationParameters, Task
 from densarm.control.controller import Gains
 from densarm.control.speed_law import SpeedParameters
 from densarm.control.tracking import require_smooth_goal
-from densarm.density.goal_distance import KAPPA_MIN, joint_weights
+from densarm.density.goal_distance import KAPPA_MIN, TorusDistance, joint_weights
 from densarm.density.navigation_density import DensityParameters
 from densarm.density.unsafe_sets import SensingParameters
 from densarm.errors import DensarmError, FileContentError, InvalidValueError, UnknownNameError
@@ -142,6 +142,11 @@ class Scenario:
     def world(self) -> World:
         """The arm among the obstacles, made when first asked for."""
         return World(self.arm, self.scene)
+
+    @property
+    def goal_distance(self) -> TorusDistance:
+        """V of the planning system and of regulation."""
+        return TorusDistance(self.arm, self.density.weights, self.control.kappa)
 
     @property
     def task(self) -> Task:

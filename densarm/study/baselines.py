@@ -13,7 +13,6 @@ from densarm.control.controller import Gains, checked_state
 from densarm.control.inverse_dynamics import InverseDynamics
 from densarm.control.regulation import FieldRegulation, VelocityField
 from densarm.control.speed_law import SpeedLaw
-from densarm.density.goal_distance import TorusDistance
 from densarm.density.unsafe_sets import SensingParameters
 from densarm.planning.motion import Motion, PlanningError
 from densarm.scenarios.run import Drive, by_density
@@ -62,12 +61,11 @@ def density_direct(scenario: Scenario, scale: float = 1.0) -> Drive:
 
 def density_moving(scenario: Scenario, scale: float = 1.0) -> Drive:
     """Follow the density of obstacles that move to the goal."""
-    arm, sensing = scenario.arm, _scaled(scenario, scale)
     field = TimeVaryingDensity(
         scenario.world,
         scenario.goal,
-        TorusDistance(arm, scenario.density.weights, scenario.control.kappa),
-        sensing,
+        scenario.goal_distance,
+        _scaled(scenario, scale),
         scenario.control.margin,
         scenario.gains,
         scenario.simulation.control_period,
@@ -77,9 +75,14 @@ def density_moving(scenario: Scenario, scale: float = 1.0) -> Drive:
 
 def control_density(scenario: Scenario, scale: float = 1.0) -> Drive:
     """Follow the shortest velocity along which the density's flow does not contract."""
-    distance = TorusDistance(scenario.arm, scenario.density.weights, scenario.control.kappa)
-    sensing, margin = _scaled(scenario, scale), scenario.control.margin
-    field = ControlDensity(scenario.world, scenario.goal, distance, sensing, margin, scenario.gains)
+    field = ControlDensity(
+        scenario.world,
+        scenario.goal,
+        scenario.goal_distance,
+        _scaled(scenario, scale),
+        scenario.control.margin,
+        scenario.gains,
+    )
     return _regulated(scenario, field)
 
 
@@ -219,12 +222,9 @@ def _by_density(scenario: Scenario, scale: float, form: ControlForm, guide: str)
 
 def _follow(scenario: Scenario, field: type[BarrierField], *parameters: float) -> Drive:
     """Return what follows a field; each gets the same distances, margin and pull."""
-    distance, gains = (
-        TorusDistance(scenario.arm, scenario.density.weights, scenario.control.kappa),
-        scenario.gains,
-    )
     barriers = Barriers(scenario.world, scenario.control.margin)
-    return _regulated(scenario, field(barriers, scenario.goal, distance, gains.rate, *parameters))
+    distance, rate = scenario.goal_distance, scenario.gains.rate
+    return _regulated(scenario, field(barriers, scenario.goal, distance, rate, *parameters))
 
 
 def _regulated(scenario: Scenario, field: VelocityField) -> Drive:

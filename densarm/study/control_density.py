@@ -8,7 +8,7 @@ from densarm.density.critical_points import find_stall
 from densarm.density.goal_distance import GoalDistance
 from densarm.density.navigation_density import DensityParameters, NavigationDensity
 from densarm.density.sub_goals import CRITICAL_SLOPE
-from densarm.density.unsafe_sets import ClearanceSet, JointLimitSet, SensingParameters, UnsafeSet
+from densarm.density.unsafe_sets import SensingParameters, sensed_sets
 from densarm.values.arrays import Array
 from densarm.world.active_pairs import DistanceBounds
 from densarm.world.world import World
@@ -68,9 +68,7 @@ class ControlDensity:
         gains: Gains = Gains(),
     ) -> None:
         n = world.arm.nv
-        self._pairs = ClearanceSet(world, margin, sensing.distance)
-        self._limits = JointLimitSet(world.arm, sensing.joint)
-        unsafe: list[UnsafeSet] = [self._pairs, self._limits]
+        self._pairs, self._limits = unsafe = sensed_sets(world, margin, sensing)
         parameters = DensityParameters(alpha=float(n))
         self.density = NavigationDensity(world.arm, goal, unsafe, goal_distance, parameters)
         self.bound = 2.0 * n * gains.rate

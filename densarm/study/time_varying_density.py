@@ -7,7 +7,7 @@ from densarm.density.critical_points import find_stall
 from densarm.density.goal_distance import GoalDistance
 from densarm.density.inverse_bump import log_inverse_bump
 from densarm.density.navigation_density import V_MIN, Gauge, NavigationDensity
-from densarm.density.unsafe_sets import ClearanceSet, JointLimitSet, SensingParameters, UnsafeSet
+from densarm.density.unsafe_sets import SensingParameters, sensed_sets
 from densarm.values.arrays import Array
 from densarm.values.checks import positive
 from densarm.world.active_pairs import DistanceBounds
@@ -61,9 +61,7 @@ class TimeVaryingDensity:
         decay: float = _DECAY,
     ) -> None:
         self._world, self._rate = world, gains.rate
-        self._pairs = ClearanceSet(world, margin, sensing.distance)
-        self._limits = JointLimitSet(world.arm, sensing.joint)
-        unsafe: list[UnsafeSet] = [self._pairs, self._limits]
+        self._pairs, self._limits = unsafe = sensed_sets(world, margin, sensing)
         self.density = NavigationDensity(world.arm, goal, unsafe, goal_distance)
         self._period, self._decay = positive("period", period), positive("decay", decay)
         self._goal_velocity = np.zeros(world.arm.nv)

@@ -1,6 +1,6 @@
-"""Discs in the joint space of two-joint arms, and the two-link arm between its two balls."""
+"""Discs in the joint space of two-joint arms, the two-link arm, and a disc in the plane."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -9,9 +9,13 @@ import pytest
 
 from densarm.arms.arm import Arm
 from densarm.arms.description import RobotDescription
+from densarm.arms.free_body import free_body
 from densarm.scenarios.scenario import Scenario
+from densarm.scene.obstacles import Box, Obstacle, Sphere
+from densarm.scene.scene import Scene
 from densarm.values.arrays import Array
 from densarm.world.swept_check import SweptCheck
+from densarm.world.world import World
 
 BOUND = 3.0  # [m]
 
@@ -139,3 +143,26 @@ def curve(check: SweptCheck) -> Array:
     """Return a polyline with corners, over the back of a continuous joint."""
     corners = np.array([[2.8, 0.0], [3.4, 0.9], [4.0, 0.6], [3.6, -0.4]])
     return check.arm.configurations(corners)
+
+
+@pytest.fixture
+def among() -> Callable[..., tuple[World, Array, Array]]:
+    """Return a maker of a disc's world in the plane, and of two ends there."""
+
+    def make(
+        obstacles: list[Obstacle], start: Sequence[float], goal: Sequence[float]
+    ) -> tuple[World, Array, Array]:
+        arm = free_body(Sphere(name="disc", radius=0.1), "plane", [(-1.2, 1.2)] * 2)
+        return World(arm, Scene(obstacles)), np.array(start), np.array(goal)
+
+    return make
+
+
+@pytest.fixture
+def cap() -> list[Obstacle]:
+    """Open to the right: what is inside and what is behind hide from each other."""
+    return [
+        Box(name="back", size=(0.1, 1.0, 0.3)),
+        Box(name="upper", size=(0.5, 0.1, 0.3), position=(0.2, 0.45, 0.0)),
+        Box(name="lower", size=(0.5, 0.1, 0.3), position=(0.2, -0.45, 0.0)),
+    ]

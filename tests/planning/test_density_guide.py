@@ -1,6 +1,6 @@
 """DensityGuide: the density alone, then via points, and what is said of it."""
 
-from collections.abc import Sequence
+from collections.abc import Callable
 from dataclasses import replace
 from itertools import pairwise
 from typing import Any
@@ -8,36 +8,21 @@ from typing import Any
 import numpy as np
 import pytest
 
-from densarm.arms.free_body import free_body
 from densarm.planning.guide import PlanningParameters
 from densarm.planning.motion import PlanningError
 from densarm.planning.plan import plan_motion, plan_path
 from densarm.scenarios.run import run
 from densarm.scenarios.scenario import Scenario, load_scenario
-from densarm.scene.obstacles import Box, Obstacle, Sphere
-from densarm.scene.scene import Scene
+from densarm.scene.obstacles import Box, Obstacle
 from densarm.values.outcome import Outcome
 from densarm.world.swept_check import SweptCheck
-from densarm.world.world import World
 
-CAP: list[Obstacle] = [
-    Box(name="back", size=(0.1, 1.0, 0.3)),
-    Box(name="upper", size=(0.5, 0.1, 0.3), position=(0.2, 0.45, 0.0)),
-    Box(name="lower", size=(0.5, 0.1, 0.3), position=(0.2, -0.45, 0.0)),
-]
-"""Open to the right: what is inside and what is behind hide from each other."""
-
-
-def among(obstacles: list[Obstacle], start: Sequence[float], goal: Sequence[float]) -> Any:
-    """Return a disc's world in the plane, and two ends."""
-    arm = free_body(Sphere(name="disc", radius=0.1), "plane", [(-1.2, 1.2)] * 2)
-    return World(arm, Scene(obstacles)), np.array(start), np.array(goal)
-
+Among = Callable[..., Any]
 
 INSIDE, BEHIND = (0.25, 0.0), (-0.7, 0.0)
 
 
-def test_the_density_alone_leads_where_it_can() -> None:
+def test_the_density_alone_leads_where_it_can(among: Among) -> None:
     wall = Box(name="wall", size=(0.1, 1.0, 0.3))
     world, start, goal = among([wall], (0.3, 0.2), (-0.6, 0.9))
     planned = plan_path(world, start, goal, "density")
@@ -48,9 +33,9 @@ def test_the_density_alone_leads_where_it_can() -> None:
     assert all(check.segment_is_clear(a, b) for a, b in pairwise(planned.path.waypoints))
 
 
-def test_a_via_point_leads_round_what_holds_both_ends() -> None:
+def test_a_via_point_leads_round_what_holds_both_ends(among: Among, cap: list[Obstacle]) -> None:
     for ends in ((INSIDE, BEHIND), (BEHIND, INSIDE)):
-        world, start, goal = among(CAP, *ends)
+        world, start, goal = among(cap, *ends)
         with pytest.raises(PlanningError, match="maximum of the density"):
             plan_motion(world, start, goal, "direct")
         motion = plan_motion(world, start, goal, "density")
@@ -61,8 +46,8 @@ def test_a_via_point_leads_round_what_holds_both_ends() -> None:
         assert min(world.distances(q).min() for q in motion.position) > 0.0
 
 
-def test_the_same_seed_gives_the_same_via_point() -> None:
-    world, start, goal = among(CAP, INSIDE, BEHIND)
+def test_the_same_seed_gives_the_same_via_point(among: Among, cap: list[Obstacle]) -> None:
+    world, start, goal = among(cap, INSIDE, BEHIND)
     one, same, other = (
         plan_path(world, start, goal, "density", seed=seed).path.waypoints for seed in (1, 1, 2)
     )
@@ -70,8 +55,8 @@ def test_the_same_seed_gives_the_same_via_point() -> None:
     assert not np.array_equal(one, other)
 
 
-def test_without_via_points_it_is_stuck_and_says_where() -> None:
-    world, start, goal = among(CAP, INSIDE, BEHIND)
+def test_without_via_points_it_is_stuck_and_says_where(among: Among, cap: list[Obstacle]) -> None:
+    world, start, goal = among(cap, INSIDE, BEHIND)
     search = PlanningParameters(vias=0)
     with pytest.raises(PlanningError) as caught:
         plan_motion(world, start, goal, "density", search=search)
@@ -89,7 +74,7 @@ CELL: list[Obstacle] = [
 """Closed: nothing leads out of it."""
 
 
-def test_where_no_via_point_helps_it_says_how_many_were_tried() -> None:
+def test_where_no_via_point_helps_it_says_how_many_were_tried(among: Among) -> None:
     world, start, goal = among(CELL, (0.0, 0.0), BEHIND)
     with pytest.raises(PlanningError) as caught:
         plan_motion(world, start, goal, "density", search=PlanningParameters(vias=3))
@@ -97,8 +82,10 @@ def test_where_no_via_point_helps_it_says_how_many_were_tried() -> None:
     assert caught.value.detail.endswith("from none of 3 via points it leads to both ends")
 
 
-def test_auto_asks_the_planner_where_the_density_is_stuck() -> None:
-    world, start, goal = among(CAP, INSIDE, BEHIND)
+def test_auto_asks_the_planner_where_the_density_is_stuck(
+    among: Among, cap: list[Obstacle]
+) -> None:
+    world, start, goal = among(cap, INSIDE, BEHIND)
     path = plan_path(world, start, goal, search=PlanningParameters(vias=0)).path
     assert path.found_by == "RRT-Connect"
     assert path.stuck.startswith("maximum of the density")

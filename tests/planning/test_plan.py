@@ -1,6 +1,6 @@
 """Planning: a motion to the goal, proved clear, or an error that says why there is none."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from typing import Any
@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 from densarm.arms.arm import Arm
-from densarm.arms.free_body import free_body
 from densarm.arms.joints import POSITION_TOLERANCE
 from densarm.control.tracking import DensityTracking
 from densarm.density.goal_distance import TorusDistance
@@ -31,6 +30,8 @@ from densarm.values.outcome import Outcome
 from densarm.world.stopping import StoppingCheck, StoppingTrajectory
 from densarm.world.swept_check import SweptCheck, SweptVerdict
 from densarm.world.world import World
+
+Among = Callable[..., Any]
 
 
 def planned(scenario: Scenario, guide: Any = "path", **changes: Any) -> Motion:
@@ -278,7 +279,9 @@ def test_the_safety_margin_is_kept_by_path_and_motion(swing_up: Scenario, margin
     assert check.least_distance_margin(configurations(swing_up.arm, motion, 5)) > 0.0
 
 
-def test_a_pair_that_is_close_at_an_end_keeps_less_and_the_others_what_they_may() -> None:
+def test_a_pair_that_is_close_at_an_end_keeps_less_and_the_others_what_they_may(
+    among: Among,
+) -> None:
     near = Sphere(name="near", radius=0.1, position=(-0.7, 0.208, 0.0))
     far = Sphere(name="far", radius=0.1, position=(0.0, 0.14, 0.0))
     world, start, goal = among([near, far], (-0.7, 0.0), (0.7, 0.0))
@@ -293,13 +296,6 @@ def test_a_pair_that_is_close_at_an_end_keeps_less_and_the_others_what_they_may(
 # The planning system.
 
 
-def among(obstacles: list[Obstacle], start: Sequence[float], goal: Sequence[float]) -> Any:
-    """Return a disc's world in the plane, and two ends."""
-    disc = Sphere(name="disc", radius=0.1)
-    arm = free_body(disc, "plane", [(-1.2, 1.2)] * 2)
-    return World(arm, Scene(obstacles)), np.array(start), np.array(goal)
-
-
 def curve_of(world: World, motion: Motion) -> tuple[IntegralCurve, str]:
     """Return the curve from the start of a motion along its sub-goals, and why it is stuck."""
     assert motion.path is not None
@@ -310,7 +306,7 @@ def curve_of(world: World, motion: Motion) -> tuple[IntegralCurve, str]:
     return curve, legs.why_stuck(curve)
 
 
-def test_stuck_from_the_start_it_comes_back_from_the_goal() -> None:
+def test_stuck_from_the_start_it_comes_back_from_the_goal(among: Among) -> None:
     wall = Box(name="wall", size=(0.1, 1.0, 0.3))
     beside, behind = (-0.6, 0.9), (0.3, 0.2)
     for ends in ((beside, behind), (behind, beside)):
@@ -320,12 +316,9 @@ def test_stuck_from_the_start_it_comes_back_from_the_goal() -> None:
         assert curve_of(world, motion)[0].reached == (ends[0] == behind)
 
 
-def test_stuck_from_both_ends_it_goes_where_the_start_leads() -> None:
-    cap: list[Obstacle] = [
-        Box(name="back", size=(0.1, 1.0, 0.3)),
-        Box(name="upper", size=(0.5, 0.1, 0.3), position=(0.2, 0.45, 0.0)),
-        Box(name="lower", size=(0.5, 0.1, 0.3), position=(0.2, -0.45, 0.0)),
-    ]
+def test_stuck_from_both_ends_it_goes_where_the_start_leads(
+    among: Among, cap: list[Obstacle]
+) -> None:
     error = why_not(*among(cap, (-0.7, 0.0), (0.25, 0.0)), "direct")
     world = among(cap, (-0.7, 0.0), (0.25, 0.0))[0]
     assert error.outcome == Outcome.STUCK
@@ -337,7 +330,9 @@ def test_stuck_from_both_ends_it_goes_where_the_start_leads() -> None:
 
 
 @pytest.mark.parametrize(("alpha", "passes"), [(1.0, False), (10.0, True)])
-def test_a_larger_alpha_leads_through_a_narrower_gap(alpha: float, passes: bool) -> None:
+def test_a_larger_alpha_leads_through_a_narrower_gap(
+    among: Among, alpha: float, passes: bool
+) -> None:
     posts: list[Obstacle] = [
         Sphere(name=name, radius=0.2, position=(0.0, y, 0.0))
         for name, y in (("left", 0.33), ("right", -0.33))
