@@ -1,4 +1,4 @@
-"""Time-optimal timing of a path under velocity, acceleration and torque limits, by TOPP-RA."""
+"""Timing of a path: time-optimal by TOPP-RA, and smoothed for limits of jerk and torque rate."""
 
 import math
 import sys
@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from importlib import import_module
 from types import ModuleType
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -76,8 +76,26 @@ _ROUNDS = 12  # of slowing down where stopping is not proved
 _HALVINGS = 7  # of the range that the largest speed to stop from is in
 _CAP_SHARE = 0.98  # of that speed; the rest is for what lies between grid points
 
+_WINDOWS = 6  # that smoothing is tried with at most
+_FIRST_WINDOW, _LARGEST_WINDOW = 0.01, 0.5  # of the motion's duration
+_NEAR_ENOUGH = 0.02  # to their limits, that none other is tried
+_SEARCHED = 400  # samples that show rates well enough to choose a window
+_SEARCH_SHARE = 0.985  # of the limits there; the rest is for what lies between them
+_WIDENINGS = 3  # of the window, which cost less than slowing down
+
+_WEIGHED = 8  # samples from one whose torque of gravity is computed to the next
+
 _Timing = tuple[Motion, Array, Array]
-"""A motion, and path positions (N,) and speeds (N,) [1/s] at its knots."""
+"""A motion, and path positions (N,) and speeds (N,) [1/s] at its knots, unsmoothed if less."""
+
+
+class _Rates(NamedTuple):
+    """What a motion may use of the limits of rates, infinite where there are none."""
+
+    jerk: Array
+    """Of acceleration (nv,) [rad/s³ or m/s³]."""
+    torque: Array
+    """Of torque, but for gravity's (nv,) [N·m/s or N/s]."""
 
 
 def time_path(
@@ -88,12 +106,15 @@ def time_path(
     parameters: TimingParameters,
     stopping: StoppingCheck | None = None,
     time_limit: float = math.inf,
+    *,
+    has_rates: bool = True,
 ) -> Motion:
     """Return the fastest motion along a path, from rest to rest.
 
     The grid follows from the path's length [rad]; the motion has a knot in each period [s]. Where
     stopping from every fourth of them is not proved clear, the path is slowed down until it is,
-    there alone.
+    there alone. For limits of jerk and torque rate, which may be left out, the path's parameter is
+    averaged over a window of time: the path stays, and takes as much longer as the window.
 
     Raises:
         PlanningError: no speed meets the limits somewhere on the path, none was found that the
@@ -117,6 +138,7 @@ def time_path(
     cap[slope == 0.0] = np.inf
     cap = np.minimum(unit * cap.min(axis=1), _UNLIMITED)  # path speeds [1/unit]
     longest = min(time_limit, _MOST_PERIODS * period)
+    rates = _rate_limits(arm, parameters) if has_rates else None
     for _ in range(_ROUNDS):
         squares = np.column_stack([np.zeros_like(cap), cap**2])
         capped = _Constraint(arm.nv, (*[None] * 6, squares))
@@ -129,7 +151,7 @@ def time_path(
             even = np.sqrt(8.0 * np.minimum(grid, 1.0 - grid)) / shortest.max()
             speed = np.minimum(unit * even, cap)
         timing = _timing_within_limits(
-            arm, path, grid, speed / unit, period, parameters, shortest, longest
+            arm, path, grid, speed / unit, period, parameters, rates, shortest, longest
         )
         motion, _, _ = timing
         if stopping is None:
@@ -140,6 +162,13 @@ def time_path(
             return motion
         _lower(cap, unit, stopping, arm, grid, timing, failing)
     raise _unstoppable(arm, motion.position[failing[0]])
+
+
+def _rate_limits(arm: Arm, parameters: TimingParameters) -> _Rates | None:
+    """Return the limits of rates, None without any."""
+    jerk = np.minimum(arm.limits.jerk, parameters.jerk or math.inf)
+    rates = _Rates(jerk, parameters.torque_rate_share * arm.limits.torque_rate)
+    return rates if np.isfinite(rates).any() else None
 
 
 def _least_duration(arm: Arm, travel: Array, parameters: TimingParameters) -> Array:
@@ -156,20 +185,29 @@ def _timing_within_limits(
     speed: Array,
     period: float,
     parameters: TimingParameters,
+    rates: _Rates | None,
     shortest: Array,
     longest: float,
 ) -> _Timing:
-    for _ in range(_SLOWDOWNS):
-        duration = float(_times(grid, speed)[-1])
+    window = 0.0
+    if rates and _times(grid, speed)[-1] <= longest:
+        slower, window = _window(arm, path, grid, speed, period, parameters, rates)
+        speed, window = speed / slower, slower * window
+    for attempt in range(_SLOWDOWNS):
+        duration = float(_times(grid, speed)[-1]) + window
         if duration > longest:
             raise _too_slow(arm, shortest, duration, period, longest)
-        timing = _sampled(path, grid, speed, period)
-        used = _largest_share(arm, timing[0], parameters)
-        if used <= 1.0:
+        timing = _sampled(path, grid, speed, period, window)
+        used, rate = _largest_shares(arm, timing[0], parameters, rates)
+        if used <= 1.0 and rate <= 1.0:
             return timing
+        if used <= 1.0 and attempt < _WIDENINGS:
+            window *= _LEAST_SLOWDOWN * rate
+            continue
         # A short motion is stretched to whole periods: slower is one of more of them.
         more = (timing[0].duration + 0.5 * period) / duration
-        speed = speed / max(_LEAST_SLOWDOWN, math.sqrt(used), more)
+        slower = max(_LEAST_SLOWDOWN, math.sqrt(used), math.cbrt(rate), more)
+        speed, window = speed / slower, slower * window
     _require_strength(arm, path, grid, parameters)
     detail = "no speed was found on the planned path at which all limits hold"
     raise PlanningError(Outcome.INFEASIBLE, f"arm {arm.name!r}: {detail}")
@@ -208,19 +246,73 @@ def _times(grid: Array, speed: Array) -> Array:
     return np.append(0.0, np.cumsum(2.0 * np.diff(grid) / (speed[:-1] + speed[1:])))
 
 
-def _sampled(path: SmoothPath, grid: Array, speed: Array, period: float) -> _Timing:
-    """Sample a timing, stretched to a whole number of periods."""
+def _window(
+    arm: Arm,
+    path: SmoothPath,
+    grid: Array,
+    speed: Array,
+    period: float,
+    parameters: TimingParameters,
+    rates: _Rates,
+) -> tuple[float, float]:
+    """Return how much slower a timing may be, and then smoothed over which window [s] at least.
+
+    A window w divides by w what rates jumps of acceleration have, slowing down by k divides all
+    by k³. The pair with the shortest motion is taken, among windows that each are as much wider
+    than the one before as its rates exceeded their limits.
+    """
+    duration = float(_times(grid, speed)[-1])
+    step = max(period, duration / _SEARCHED)
+    window, best, shortest = _FIRST_WINDOW * duration, (1.0, 0.0), math.inf
+    for _ in range(_WINDOWS):
+        motion, _, _ = _sampled(path, grid, speed, step, window)
+        shares = _largest_shares(arm, motion, parameters, rates)
+        used, rate = (share / _SEARCH_SHARE for share in shares)
+        slower = max(1.0, math.sqrt(used), math.cbrt(rate))
+        if slower * (duration + window) < shortest:
+            best, shortest = (slower, window), slower * (duration + window)
+        if abs(rate - 1.0) < _NEAR_ENOUGH or duration + window > shortest:
+            break
+        window = min(max(rate * window, period), _LARGEST_WINDOW * duration)
+    return best
+
+
+def _sampled(
+    path: SmoothPath, grid: Array, speed: Array, period: float, window: float = 0.0
+) -> _Timing:
+    """Sample a timing, averaged over a window [s] and stretched to a whole number of periods."""
     time = _times(grid, speed)
-    count = max(2, int(np.ceil(time[-1] / period)))  # one would not show its acceleration
-    stretch = count * period / time[-1]
-    at = np.linspace(0.0, time[-1], count + 1)
-    k = np.clip(np.searchsorted(time, at, side="right") - 1, 0, len(grid) - 2)
-    elapsed = at - time[k]
-    acceleration = np.diff(speed**2)[k] / (2.0 * np.diff(grid)[k])
-    s = np.clip(grid[k] + elapsed * (speed[k] + 0.5 * acceleration * elapsed), 0.0, 1.0)
-    s_rate = np.maximum(speed[k] + acceleration * elapsed, 0.0) / stretch
+    end = time[-1] + window
+    count = max(2, int(np.ceil(end / period)))  # one would not show its acceleration
+    stretch = count * period / end
+    at = np.linspace(0.0, end, count + 1)
+    s, s_rate, area = _passed(grid, speed, time, at)
+    if window > 0.0:
+        before, _, area_before = _passed(grid, speed, time, at - window)
+        s_rate = (s - before) / window
+        s = np.clip((area - area_before) / window, 0.0, 1.0)
+    s_rate /= stretch
     s[-1], s_rate[[0, -1]] = 1.0, 0.0
-    return Motion(period, path(s), path(s, 1) * s_rate[:, np.newaxis]), s, s_rate
+    motion = Motion(period, path(s), path(s, 1) * s_rate[:, np.newaxis])
+    if window > 0.0:
+        s_rate = np.minimum(s_rate, np.interp(s, grid, speed) / stretch)
+    return motion, s, s_rate
+
+
+def _passed(grid: Array, speed: Array, time: Array, at: Array) -> tuple[Array, Array, Array]:
+    """Return path positions, speeds, and the integral of positions, each (N,), at times (N,) [s].
+
+    The path's start is kept before it is left, its end after it is reached.
+    """
+    acceleration, width = np.diff(speed**2) / (2.0 * np.diff(grid)), np.diff(time)
+    area = width * (grid[:-1] + width * (0.5 * speed[:-1] + acceleration * width / 6.0))
+    area = np.append(0.0, np.cumsum(area))
+    within = np.clip(at, 0.0, time[-1])
+    k = np.clip(np.searchsorted(time, within, side="right") - 1, 0, len(grid) - 2)
+    elapsed, a, v = within - time[k], acceleration[k], speed[k]
+    s = np.clip(grid[k] + elapsed * (v + 0.5 * a * elapsed), 0.0, 1.0)
+    area = area[k] + elapsed * (grid[k] + elapsed * (0.5 * v + a * elapsed / 6.0))
+    return s, np.maximum(v + a * elapsed, 0.0), area + np.maximum(at - time[-1], 0.0)
 
 
 def _lower(
@@ -253,17 +345,36 @@ def _lower(
     np.minimum.at(cap, cell + 1, allowed)
 
 
-def _largest_share(arm: Arm, motion: Motion, parameters: TimingParameters) -> float:
-    """Return the largest share of what it may use of its limits that a motion uses at a sample."""
-    v, limits = motion.velocity, arm.limits
-    a = np.diff(v, axis=0) / motion.period
-    torque = JointTorques(arm)(arm.configurations(motion.position[:-1]), v[:-1], a)
+def _largest_shares(
+    arm: Arm, motion: Motion, parameters: TimingParameters, rates: _Rates | None
+) -> tuple[float, float]:
+    """Return the largest share that a motion uses of what it may of its limits, and of its rates.
+
+    Samples are those at the knots whose acceleration is the mean up to the next knot, as for
+    torques that are held; for rates also those at the knots themselves. It rests before and after.
+    """
+    limits, period, v = arm.limits, motion.period, motion.velocity
+    q, start, end = arm.configurations(motion.position[:-1]), v[:-1], v[1:]
+    a, torques = (np.diff(v, axis=0) / period)[np.newaxis], JointTorques(arm)
+    if rates:
+        rise = np.diff(motion.position, axis=0) / period
+        a = np.append(a, [(6.0 * rise - 4.0 * start - 2.0 * end) / period], axis=0)
+    torque = torques(np.array([q] * len(a)), np.array([start] * len(a)), a)
     used = (
         np.abs(v) / (parameters.velocity_share * limits.velocity),
         np.abs(a) / (parameters.acceleration_share * limits.acceleration),
         np.abs(torque) / (parameters.torque_share * limits.effort),
     )
-    return max(float(share.max()) for share in used)
+    rate = 0.0
+    if rates:
+        # Gravity's torque has no corners, unlike the rest.
+        known = np.unique(np.append(np.arange(0, len(q), _WEIGHED), len(q) - 1))
+        weights = torques(q[known], 0.0 * start[known], 0.0 * start[known])
+        weight = [np.interp(np.arange(len(q)), known, column) for column in weights.T]
+        for rows, limit in ((a, rates.jerk), (torque - np.transpose(weight), rates.torque)):
+            steps = np.abs(np.diff(rows, axis=1, prepend=0.0, append=0.0)).max(axis=(0, 1))
+            rate = max(rate, float((steps / (period * limit)).max()))
+    return max(float(share.max()) for share in used), rate
 
 
 def _unstoppable(arm: Arm, angles: Array) -> PlanningError:
