@@ -1,12 +1,7 @@
 """Timing of a path: time-optimal by TOPP-RA, and smoothed for limits of jerk and torque rate."""
 
 import math
-import sys
-from collections.abc import Iterator
-from contextlib import contextmanager
-from importlib import import_module
-from types import ModuleType
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,60 +10,15 @@ from densarm.arms.arm import Arm
 from densarm.arms.dynamics import JointTorques, holding_ratios, holding_torque
 from densarm.planning.motion import Motion, PlanningError, TimingParameters
 from densarm.planning.smoothing import SmoothPath
+from densarm.planning.topp_ra import UNLIMITED, ToppRa, bounded
 from densarm.values.arrays import Array
 from densarm.values.outcome import Outcome
 from densarm.world.stopping import StoppingCheck
 
-
-class _Late(ModuleType):
-    """Stands for a module, and for what it holds, until that is used."""
-
-    def __init__(self, module: str, held: str = "") -> None:
-        super().__init__(module)
-        self._held = held
-
-    def __getattr__(self, name: str) -> Any:
-        if self._held:
-            return getattr(self._found(), name)
-        if name.startswith("__"):
-            raise AttributeError(name)
-        return _Late(self.__name__, name)
-
-    def __call__(self, *arguments: Any, **options: Any) -> Any:
-        return self._found()(*arguments, **options)
-
-    def _found(self) -> Any:
-        return getattr(import_module(self.__name__), self._held)
-
-
-@contextmanager
-def _left_for_later(*names: str) -> Iterator[None]:
-    """Import what imports modules, which takes longer than all that is planned, without them."""
-    late = {name: _Late(name) for name in names if name not in sys.modules}
-    for name, module in late.items():
-        package, _, own = name.rpartition(".")
-        if package in late:
-            setattr(late[package], own, module)
-    sys.modules |= late
-    try:
-        yield
-    finally:
-        for name in late:
-            del sys.modules[name]
-
-
-with _left_for_later("matplotlib", "matplotlib.pyplot", "scipy.interpolate"):
-    import toppra
-    import toppra.algorithm
-    import toppra.constraint
-    from toppra.constraint import canlinear_colloc_to_interpolate
-
-_UNLIMITED = 1e4  # stands for an infinite limit, which TOPP-RA's solver does not take
-_DURATIONS = 0.25, 4.0  # [s]; its tolerances are absolute, and too small or large for others
+_DURATIONS = 0.25, 4.0  # [s]; TOPP-RA's tolerances are absolute, too small or large for others
 _MOST_PERIODS = 1_000_000  # of a motion, so that its arrays fit into memory
 _GRID_STEP = 0.0125  # [rad] between grid points at most
 _GRID = (200, 1000)
-_GRID_SHARE = 0.98  # of the limits at grid points; the rest is for what lies between them
 _SLOWDOWNS = 50  # tried in turn until the limits hold at every sample
 _LEAST_SLOWDOWN = 1.002
 _CHECKED = 4  # samples from one whose stopping is checked to the next
@@ -130,28 +80,27 @@ def time_path(
     travel = slope.mean(axis=0)
     shortest = _least_duration(arm, travel, parameters)
     unit = float(shortest.max() / np.clip(shortest.max(), *_DURATIONS))  # of time [s], to TOPP-RA
-    limits = _limits(arm, path, grid, unit, parameters)
+    topp_ra = ToppRa(arm, path, grid, unit, parameters)
     # No joint gets faster than √(a travel) from rest to rest, which TOPP-RA's solver does not see.
     reached = np.minimum(arm.limits.velocity, 2.0 * np.sqrt(arm.limits.acceleration * travel))
     with np.errstate(divide="ignore", invalid="ignore"):
-        cap = _bounded(parameters.velocity_share * reached) / slope
+        cap = bounded(parameters.velocity_share * reached) / slope
     cap[slope == 0.0] = np.inf
-    cap = np.minimum(unit * cap.min(axis=1), _UNLIMITED)  # path speeds [1/unit]
+    cap = np.minimum(unit * cap.min(axis=1), UNLIMITED)  # path speeds [1/unit]
     longest = min(time_limit, _MOST_PERIODS * period)
-    rates = _rate_limits(arm, parameters) if has_rates else None
+    rates, least = _rate_limits(arm, parameters) if has_rates else None, shortest
+    if rates:
+        least = np.maximum(shortest, np.cbrt(32.0 * travel / rates.jerk))
     for _ in range(_ROUNDS):
-        squares = np.column_stack([np.zeros_like(cap), cap**2])
-        capped = _Constraint(arm.nv, (*[None] * 6, squares))
-        fastest = toppra.algorithm.TOPPRA([limits, capped], path, grid)
-        _, speed, _ = fastest.compute_parameterization(0.0, 0.0)
-        if speed is None or not np.isfinite(speed).all():
+        speed = topp_ra.speeds(cap)
+        if speed is None:
             _require_strength(arm, path, grid, parameters)
             # Its solver takes lines that are nearly parallel, as those of a straight path are, for
             # contradicting ones at times. Speeding up evenly, then braking, is a guess to slow.
             even = np.sqrt(8.0 * np.minimum(grid, 1.0 - grid)) / shortest.max()
             speed = np.minimum(unit * even, cap)
         timing = _timing_within_limits(
-            arm, path, grid, speed / unit, period, parameters, rates, shortest, longest
+            arm, path, grid, speed / unit, period, parameters, rates, least, longest
         )
         motion, _, _ = timing
         if stopping is None:
@@ -384,53 +333,3 @@ def _unstoppable(arm: Arm, angles: Array) -> PlanningError:
         f"arm {arm.name!r}: no speed was found from which it could stop in free space at joint "
         f"positions ({where}) of the planned path",
     )
-
-
-def _bounded(limit: Array) -> Array:
-    return np.minimum(_GRID_SHARE * limit, _UNLIMITED)
-
-
-def _limits(
-    arm: Arm, path: SmoothPath, grid: Array, unit: float, parameters: TimingParameters
-) -> "_Constraint":
-    """Return limits of acceleration and torque, a s̈ + b ṡ² + c, at both ends of all intervals.
-
-    Torques without a limit, which may exceed what stands for infinity, are not among them. The
-    path's derivatives are by a unit of time [s].
-    """
-    theta, slope, bend = (path(grid, order) for order in range(3))
-    q, zero = arm.configurations(theta), np.zeros_like(slope)
-    speed, slope, bend = slope / unit, slope / unit**2, bend / unit**2
-    torques = JointTorques(arm)
-    held, driven, swung = (
-        torques(q, v, a) for v, a in ((zero, zero), (zero, slope), (speed, bend))
-    )
-    weak = np.isfinite(arm.limits.effort)
-    limit = np.append(
-        _bounded(parameters.acceleration_share * arm.limits.acceleration),
-        _bounded(parameters.torque_share * arm.limits.effort[weak]),
-    )
-    coefficients = canlinear_colloc_to_interpolate(
-        np.hstack([slope, (driven - held)[:, weak]]),
-        np.hstack([bend, (swung - held)[:, weak]]),
-        np.hstack([zero, held[:, weak]]),
-        np.vstack([np.eye(len(limit)), -np.eye(len(limit))]),
-        np.append(limit, limit),
-        None,
-        None,
-        grid,
-        identical=True,
-    )
-    return _Constraint(arm.nv, coefficients)
-
-
-class _Constraint(toppra.constraint.LinearConstraint):
-    """Limits at grid points by their coefficients, as TOPP-RA asks for them."""
-
-    def __init__(self, dof: int, coefficients: Any) -> None:
-        super().__init__()
-        self.dof, self.identical = dof, True
-        self._coefficients = coefficients
-
-    def compute_constraint_params(self, *_: object) -> Any:
-        return self._coefficients
