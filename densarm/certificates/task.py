@@ -116,6 +116,10 @@ class Task:
     simulation: SimulationParameters = field(default_factory=SimulationParameters)
     input: Input = Input.TORQUE
     """What the plant is told."""
+    plant: str = "pinocchio"
+    """What is driven: "pinocchio", the arm's model or a plant of one's own, or "mujoco"."""
+    disturbances: Mapping[str, Any] = field(default_factory=dict)
+    """How the plant differs from the model, `Disturbances.given`; empty where it does not."""
     settings: Mapping[str, Any] = field(default_factory=dict)
     """What else a scenario says, as JSON data: read by those who plan and control, kept here."""
 
@@ -156,6 +160,8 @@ class Task:
             "start": self.arm.angles(self.start).tolist(),
             "goal": goal,
             "input": str(self.input),
+            "plant": self.plant,
+            "disturbances": dict(self.disturbances),
             "control": control,
             **{key: asdict(getattr(self, key)) for key in _TABLES},
         }
@@ -183,6 +189,8 @@ class Task:
                 margin=float(control["margin"]),
                 kappa=float(control["kappa"]),
                 input=Input(data.get("input", Input.TORQUE)),
+                plant=str(data.get("plant", "pinocchio")),
+                disturbances=dict(data.get("disturbances", {})),
                 settings={key: value for key, value in data.items() if key not in own},
                 **{key: parse_table(key, kind, data[key]) for key, kind in _TABLES.items()},
             )

@@ -98,7 +98,7 @@ def run_by(
         searched = error.outcome == Outcome.NO_PATH
         return replace(ended, plan_time=time.perf_counter() - began if searched else 0.0)
     elapsed = time.perf_counter() - began
-    done = simulate_task(task, world, drive.controller, plant, on_progress)
+    done = simulate_task(task, world, drive.controller, plant, on_progress=on_progress)
     if done.outcome == Outcome.INFEASIBLE:
         return done
     led_by, stuck = (drive.path.found_by, drive.path.stuck) if drive.path else ("", "")
