@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from densarm.certificates.task import (
+    PLANTS,
     REACHED_POSITION,
     REACHED_VELOCITY,
     Input,
@@ -28,9 +29,6 @@ from densarm.world.world import World
 
 OnProgress = Callable[[str], None]
 """Told in a phrase what is being done."""
-
-PLANTS = ("pinocchio", "mujoco")
-"""Names of plants that are made of the arm's model."""
 
 _HELD_SHARE = 0.5  # the loop ends well inside the bounds on position and velocity at the goal
 _STALL_MOTION = 0.01  # [rad or m] within the stall time

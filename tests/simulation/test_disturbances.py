@@ -8,12 +8,12 @@ import pytest
 from numpy.typing import ArrayLike
 
 from densarm.arms.arm import load_arm
-from densarm.certificates.task import Integrator, SimulationParameters
+from densarm.certificates.task import PLANTS, Integrator, SimulationParameters
 from densarm.errors import DensarmError, InvalidValueError, UnknownNameError
 from densarm.scene.scene import Scene
 from densarm.simulation.disturbances import Disturbances, Push
 from densarm.simulation.plants import PinocchioPlant, Plant
-from densarm.simulation.simulate import PLANTS, plant_of, simulate
+from densarm.simulation.simulate import plant_of, simulate
 from densarm.values.arrays import Array
 from densarm.world.world import World
 
