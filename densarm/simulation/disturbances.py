@@ -1,7 +1,7 @@
 """Disturbances: how an arm differs from its model, as data, and what that does to a loop."""
 
 from collections import deque
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
@@ -153,6 +153,20 @@ class Disturbances:
         model.gravity.linear = self.tilted(model.gravity.linear)
         return model
 
+    def require_fit(self, arm: Arm) -> None:
+        """Refuse what is about another arm.
+
+        Raises:
+            UnknownNameError: no such frame to carry the payload, or joint to push.
+            InvalidValueError: not one value per joint.
+        """
+        self.model(arm)
+        for name in ("viscous", "coulomb"):
+            self.joint_values(name, arm)
+        for push in self.pushes:
+            if push.joint not in arm.joint_names:
+                raise UnknownNameError("disturbances.pushes.joint", push.joint, arm.joint_names)
+
     def tilted(self, gravity: Array) -> Array:
         """Return gravity (3,) [m/s²] as a base that leans feels it."""
         turn = pin.utils.rotate("x", -np.deg2rad(self.base_tilt_deg))
@@ -163,12 +177,9 @@ class Signals:
     """What lies between a controller and an arm in one run: sensors, a delay, and who pushes.
 
     Args:
-        disturbances: what disturbs them.
+        disturbances: what disturbs them; they fit the arm.
         arm: the arm.
         dt: time step [s].
-
-    Raises:
-        UnknownNameError: no such joint to push.
     """
 
     def __init__(self, disturbances: Disturbances, arm: Arm, dt: float) -> None:
@@ -176,9 +187,6 @@ class Signals:
         self._random = np.random.default_rng(disturbances.seed)
         steps = round(disturbances.torque_delay / dt)
         self._sent: deque[Array] = deque(maxlen=steps + 1)
-        for push in disturbances.pushes:
-            if push.joint not in arm.joint_names:
-                raise UnknownNameError("disturbances.pushes.joint", push.joint, arm.joint_names)
 
     def measured(self, q: Array, v: Array) -> tuple[Array, Array]:
         """Return what sensors tell of a state, q (nq,) and v (nv,)."""
@@ -206,7 +214,3 @@ class Signals:
                 v = v.copy()
                 v[self._arm.joint_names.index(push.joint)] += push.velocity / steps
         return v
-
-
-DISTURBANCES = tuple(item.name for item in fields(Disturbances))
-"""Names of all disturbances."""

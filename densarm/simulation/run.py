@@ -128,6 +128,8 @@ class Run:
             "plan_time_s": self.plan_time,
             "preparation_time_s": self.preparation_time,
             "certified": self.certified,
+            "plant": self.task.plant,
+            "disturbances": dict(self.task.disturbances),
         }
 
     def save(self, path: str | Path) -> None:

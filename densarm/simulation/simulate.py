@@ -128,6 +128,7 @@ def simulate_task(
         driven: Plant = SingleIntegrator(world.arm, parameters.dt)
     else:
         driven = plant or plant_of(world, task.plant, parameters, told)
+    told.require_fit(world.arm)
     if told.of_the_body != getattr(driven, "disturbances", Disturbances()).of_the_body:
         allowed = "those of the plant, which is given its own when it is made"
         raise InvalidValueError("disturbances", list(told.of_the_body), allowed)
