@@ -48,7 +48,9 @@ def regulation(
 ) -> densarm.Controller:
     """The controller to a goal by way of a path, told a delay [s]."""
     del delay
-    return densarm.DensityRegulation(scenario.world, scenario.goal, path=path)
+    return densarm.DensityRegulation(
+        scenario.world, scenario.goal, path=path, margin=scenario.control.margin
+    )
 
 
 def tracking_error(run: densarm.Run, motion: densarm.Motion) -> float:
@@ -70,8 +72,14 @@ def delayed(delay: float) -> Case:
     return Case(Disturbances(torque_delay=delay), declared=delay)
 
 
-NOISE = {"encoder_noise": 1e-4, "velocity_noise": 1e-2}
-ALL = {"mass_scale": 1.1, "coulomb": 0.5, "viscous": 0.5, "torque_delay": 0.002, **NOISE}
+NOISE: dict[str, Any] = {"encoder_noise": 1e-4, "velocity_noise": 1e-2}
+ALL: dict[str, Any] = {
+    "mass_scale": 1.1,
+    "coulomb": 0.5,
+    "viscous": 0.5,
+    "torque_delay": 0.002,
+    **NOISE,
+}
 CASES = {
     "exact": Case(),
     "noise": Case(Disturbances(**NOISE)),
@@ -117,20 +125,17 @@ def run_cases(
     """Plan a scenario or problem and run it in cases; the number seeds what is drawn for it."""
     known, seed = item
     scenario = densarm.load_scenario(known) if isinstance(known, str) else scenario_of(known)
-    world, law = scenario.world, {"margin": scenario.control.margin, "seed": scenario.seed}
-    motion = path = None
+    world, law = scenario.world, dict[str, Any](margin=scenario.control.margin, seed=scenario.seed)
+    motion, moves = None, LONGEST
     if form == "tracking":
         motion = densarm.plan_motion(world, scenario.start, scenario.goal, **law)
+        make, moves = partial(tracking, world, motion), motion.duration
     else:
         path = plan_path(world, scenario.start, scenario.goal, **law).path
+        make = partial(regulation, scenario, path)
     results = []
     for name in names:
         for told in told_in(CASES[name], scenario, motion, seed):
-            delay = CASES[name].declared
-            if motion:
-                controller, moves = tracking(world, motion, delay), motion.duration
-            else:
-                controller, moves = regulation(scenario, path, delay), 5.0
             parameters = replace(
                 scenario.simulation,
                 hold_time=REST,
@@ -139,7 +144,7 @@ def run_cases(
             )
             run = densarm.simulate(
                 world,
-                controller,
+                make(CASES[name].declared),
                 scenario.start,
                 plant="mujoco",
                 disturbances=told,

@@ -22,6 +22,7 @@ from densarm.cli.output import print_run, progress, write_json, write_pictures
     "--seed", None, "Seed of the planner.  [default: what the scenario says, else 0]", least=0
 )
 @plant_options
+@click.option("--viewer", is_flag=True, help="Show it in MuJoCo's viewer while it runs.")
 @output_option("--save", "RUN.npz", "Write the recorded run.")
 @picture_options
 @output_option("--json", "FILE", "Write the summary as JSON.")
@@ -31,6 +32,7 @@ def run(
     seed: int | None,
     plant: str | None,
     disturb: dict[str, Any],
+    viewer: bool,
     save: Path | None,
     json: Path | None,
     **pictures: Path | None,
@@ -53,6 +55,7 @@ def run(
         from densarm.scenarios.run import run as run_scenario
         from densarm.scenarios.scenario import load_scenario
         from densarm.simulation.disturbances import Disturbances
+        from densarm.simulation.mujoco_plant import MujocoPlant
         from densarm.values.kernels import on_compiling
         from densarm.values.outcome import Outcome
         from densarm.values.tables import parse_table
@@ -70,7 +73,11 @@ def run(
             told = parse_table(
                 "disturbances", Disturbances, {**chosen.disturbances.given, **disturb}
             )
-            done = run_scenario(chosen, guide, seed, report, plant=plant, disturbances=told)
+            driven: MujocoPlant | str | None = plant
+            if viewer:
+                driven = MujocoPlant(chosen.world, chosen.simulation.dt, told)
+                driven.view()
+            done = run_scenario(chosen, guide, seed, report, plant=driven, disturbances=told)
             report("proving")
             certificate = done.certificate
             report("writing")

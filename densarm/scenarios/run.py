@@ -56,7 +56,7 @@ def run(
     seed: int | None = None,
     on_progress: OnProgress = lambda _: None,
     *,
-    plant: str | None = None,
+    plant: Plant | str | None = None,
     disturbances: Disturbances | None = None,
 ) -> Run:
     """Plan and run a scenario's closed loop.
@@ -66,7 +66,7 @@ def run(
         guide: one of `GUIDES`, or a `Guide`; None for the scenario's own.
         seed: of the guide's random choices; None for the scenario's own.
         on_progress: told what is being done.
-        plant: "pinocchio" or "mujoco"; None for the scenario's own.
+        plant: "pinocchio", "mujoco", or a plant of one's own; None for the scenario's.
         disturbances: how the plant differs from the arm's model; None for the scenario's own.
 
     Returns:
@@ -84,12 +84,13 @@ def run(
         chosen = replace(chosen, control=control)
     if seed is not None:
         chosen = replace(chosen, seed=seed)
-    if plant is not None:
+    if isinstance(plant, str):
         chosen = replace(chosen, plant=plant)
     if disturbances is not None:
         chosen = replace(chosen, disturbances=disturbances)
     own = None if guide is None or isinstance(guide, str) else guide
-    return run_by(chosen, lambda scenario: by_density(scenario, own), on_progress)
+    other = None if isinstance(plant, str) else plant
+    return run_by(chosen, lambda scenario: by_density(scenario, own), on_progress, other)
 
 
 def run_by(

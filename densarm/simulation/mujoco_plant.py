@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import time
+import warnings
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -103,6 +105,7 @@ class MujocoPlant:
             )
         self._is_arm = moved[self.model.geom_bodyid]
         self._last, self._contact = (np.full(arm.nq, np.nan), np.zeros(arm.nv)), ""
+        self._viewer, self._shown = None, 0.0
         self._place_obstacles()
         if self._own:
             self._require_same_axes(names)
@@ -166,17 +169,30 @@ class MujocoPlant:
                 self._contact = self._deepest()
         q, v = self._world.arm.configurations(data.qpos[self._qpos]), data.qvel[self._dofs]
         self._last = q.copy(), v.copy()
+        if self._viewer is not None and self._viewer.is_running():
+            self._viewer.sync()
+            time.sleep(max(0.0, self._shown + self.dt - time.perf_counter()))
+            self._shown = time.perf_counter()
         return q, v
 
     def describe_contact(self) -> str:
         """Return what touched in the last step, as a phrase; empty for nothing."""
         return self._contact
 
-    def view(self) -> Any:
-        """Open MuJoCo's passive viewer on the plant, and return its handle, to be synchronised."""
+    def view(self) -> None:
+        """Open MuJoCo's viewer on the plant, which shows each step in real time from then on.
+
+        Raises:
+            DensarmError: there is no display.
+        """
+        import glfw  # which the viewer is drawn by; without a display that ends the process
         import mujoco.viewer
 
-        return mujoco.viewer.launch_passive(self.model, self.data)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            if not glfw.init():
+                raise DensarmError("the viewer needs a display, and finds none")
+        self._viewer = mujoco.viewer.launch_passive(self.model, self.data)
 
     def _deepest(self) -> str:
         """Return the deepest contact of the arm in MuJoCo's words, as a phrase."""
