@@ -12,7 +12,7 @@ import numpy as np
 from densarm.arms.arm import Arm, load_arm
 from densarm.arms.catalogue import scenario_paths
 from densarm.arms.joint_space import sliding_joints
-from densarm.certificates.task import Input, SimulationParameters, Task
+from densarm.certificates.task import PLANTS, Input, SimulationParameters, Task
 from densarm.control.controller import Gains
 from densarm.control.speed_law import SpeedParameters
 from densarm.control.tracking import require_smooth_goal
@@ -25,6 +25,7 @@ from densarm.planning.motion import TimingParameters
 from densarm.planning.plan import GUIDES, PATH_MARGIN, PLANNING_ALPHA
 from densarm.scene.loading import parse_scene
 from densarm.scene.scene import Scene
+from densarm.simulation.disturbances import Disturbances
 from densarm.values.arrays import Array
 from densarm.values.checks import (
     finite_vector,
@@ -91,7 +92,8 @@ class Scenario:
 
     Raises:
         InvalidValueError: start or goal is not a configuration, the seed is not a whole number,
-            weights are not one per joint, or the density gives no feedback that settles at a goal.
+            weights are not one per joint, the density gives no feedback that settles at a goal, or
+            a plant that velocities cannot drive, or disturbances of another arm.
         RobotDescriptionError: torque is to drive an arm with links without a mass.
     """
 
@@ -123,6 +125,10 @@ class Scenario:
     """K_p and K_v."""
     simulation: SimulationParameters = field(default_factory=SimulationParameters)
     """Time step, time limit and what counts as held or stuck."""
+    plant: str = PLANTS[0]
+    """What is driven: "pinocchio", the arm's model, or "mujoco", the same in MuJoCo."""
+    disturbances: Disturbances = field(default_factory=Disturbances)
+    """How it differs from the model."""
     seed: int = 0
     """Seed of every random choice."""
 
@@ -131,10 +137,15 @@ class Scenario:
             q = self.arm.check_configuration(f"{key} configuration", getattr(self, key))
             object.__setattr__(self, key, q)
         non_negative_integer("seed", self.seed)
+        self.disturbances.require_fit(self.arm)
+        one_of("plant", self.plant, PLANTS)
         joint_weights("density.weights", self.arm, self.density.weights)
         form = self.control.form
         if form != ControlForm.VELOCITY:
             self.arm.require_masses(f"control.form = {str(form)!r}")
+        elif self.plant != PLANTS[0] or self.disturbances.of_the_body:
+            allowed = "another where plant or disturbances of its body are set, which take torque"
+            raise InvalidValueError("control.form", str(form), allowed)
         may_blend = form in {ControlForm.REGULATION, ControlForm.PLAIN}
         require_smooth_goal(self.density, may_blend=may_blend, form=str(form))
 
@@ -156,6 +167,7 @@ class Scenario:
             margin=self.control.margin,
             kappa=self.control.kappa,
             input=Input.VELOCITY if self.control.form == ControlForm.VELOCITY else Input.TORQUE,
+            disturbances=self.disturbances.given,
             settings={"seed": self.seed, **{key: asdict(getattr(self, key)) for key in _SETTINGS}},
         )
 
@@ -176,6 +188,7 @@ class Scenario:
         return cls(
             **{key: getattr(task, key) for key in _SHARED},
             seed=settings.get("seed", 0),
+            disturbances=parse_table("disturbances", Disturbances, task.disturbances),
             **{key: parse_table(key, TABLES[key], tables.get(key, {})) for key in _SETTINGS},
         )
 
@@ -189,12 +202,14 @@ TABLES: Mapping[str, type[Any]] = {
     "speed": SpeedParameters,
     "gains": Gains,
     "simulation": SimulationParameters,
+    "disturbances": Disturbances,
 }
 """The optional tables of a scenario file and what they hold."""
 
 _SETTINGS = ("control", "planning", "timing", "speed", "gains")  # that a task does not hold itself
-_SHARED = ("name", "title", "arm", "scene", "start", "goal", "density", "sensing", "simulation")
-_KEYS = {"title", "robot", "scene", "obstacles", "task", "seed", *TABLES}
+_OF_TASK = ("density", "sensing", "simulation", "plant")
+_SHARED = ("name", "title", "arm", "scene", "start", "goal", *_OF_TASK)
+_KEYS = {"title", "robot", "scene", "obstacles", "task", "plant", "seed", *TABLES}
 
 
 def load_scenario(scenario: str | Path) -> Scenario:
@@ -236,6 +251,7 @@ def _parse(path: Path, data: dict[str, Any]) -> Scenario:
         scene=Scene(scene),
         start=_configuration(arm, "task.start", task.start),
         goal=_configuration(arm, "task.goal", task.goal),
+        plant=data.get("plant", PLANTS[0]),
         seed=data.get("seed", 0),
         **{key: parse_table(key, kind, data.get(key, {})) for key, kind in TABLES.items()},
     )

@@ -347,7 +347,7 @@ def test_json_that_is_not_a_task() -> None:
     for data in broken:
         with pytest.raises(DensarmError, match="not of format"):
             Task.from_json(data)
-    settings = {"seed", "planning", "timing", "speed", "gains", "input"}
+    settings = {"seed", "planning", "timing", "speed", "gains", "input", "plant", "disturbances"}
     for key in set(whole) - {"format", *settings}:
         with pytest.raises(DensarmError, match=key):
             Task.from_json({k: v for k, v in whole.items() if k != key})
