@@ -146,7 +146,7 @@ def by_density(scenario: Scenario, guide: Guide | None = None, *, replans: bool 
         drive.controller,
         plan_again,
         patience=0.5 * scenario.simulation.stall_time,
-        gains=scenario.gains,
+        gains=scenario.gains_of(ControlForm.REGULATION),
         period=scenario.simulation.control_period,
     )
     return replace(drive, controller=controller)
@@ -172,7 +172,8 @@ def _plan(scenario: Scenario, start: Array, guide: Guide | None) -> Drive:
             path=planned.path,
             plain=is_plain,
             margin=control.margin,
-            gains=scenario.gains,
+            gains=scenario.law_gains,
+            actuation=scenario.actuation,
             period=period,
             goal_distance=None if is_plain else scenario.goal_distance,
             speed=scenario.speed,
@@ -195,7 +196,14 @@ def _plan(scenario: Scenario, start: Array, guide: Guide | None) -> Drive:
             raise
         motion = error.motion  # the arm goes as far as the density leads, which the record shows
     distance = TorusDistance(scenario.arm, kappa=control.kappa)
-    tracking = DensityTracking(world, motion, gains=scenario.gains, goal_distance=distance, **law)
+    tracking = DensityTracking(
+        world,
+        motion,
+        gains=scenario.law_gains,
+        goal_distance=distance,
+        actuation=scenario.actuation,
+        **law,
+    )
     return Drive(tracking, motion.plan_time, motion, motion.path)
 
 
@@ -225,5 +233,5 @@ def records(run: Run) -> tuple[EnergyRecord, RantzerRecord]:
     elif control.guide != "direct":
         energy = no_energy(f"guide {control.guide!r}, whose sub-goals change U, not 'direct'")
     else:
-        energy = record_energy(run.task, density, scenario.gains, run.q, run.v, run.tau)
+        energy = record_energy(run.task, density, scenario.law_gains, run.q, run.v, run.tau)
     return energy, record_rantzer(run.task, density, run.q)

@@ -14,8 +14,9 @@ from densarm.arms.catalogue import scenario_paths
 from densarm.arms.joint_space import sliding_joints
 from densarm.certificates.task import PLANTS, Input, SimulationParameters, Task
 from densarm.control.controller import Gains
+from densarm.control.disturbance_observer import ActuationParameters
 from densarm.control.speed_law import SpeedParameters
-from densarm.control.tracking import require_smooth_goal
+from densarm.control.tracking import TRACKING_GAINS, require_smooth_goal
 from densarm.density.goal_distance import KAPPA_MIN, TorusDistance, joint_weights
 from densarm.density.navigation_density import DensityParameters
 from densarm.density.unsafe_sets import SensingParameters
@@ -121,8 +122,10 @@ class Scenario:
     """Shares of the limits that a motion may use."""
     speed: SpeedParameters = field(default_factory=SpeedParameters)
     """Shares of the limits that regulation may use."""
-    gains: Gains = field(default_factory=Gains)
-    """K_p and K_v."""
+    gains: Gains | None = None
+    """K_p and K_v; None for those that the form of control has by default."""
+    actuation: ActuationParameters = field(default_factory=ActuationParameters)
+    """How late torque is, and how far the model is trusted."""
     simulation: SimulationParameters = field(default_factory=SimulationParameters)
     """Time step, time limit and what counts as held or stuck."""
     plant: str = PLANTS[0]
@@ -154,6 +157,15 @@ class Scenario:
         """The arm among the obstacles, made when first asked for."""
         return World(self.arm, self.scene)
 
+    def gains_of(self, form: ControlForm) -> Gains:
+        """Return K_p and K_v, as given or as a form of control has them by default."""
+        return self.gains or (TRACKING_GAINS if form == ControlForm.TRACKING else Gains())
+
+    @property
+    def law_gains(self) -> Gains:
+        """K_p and K_v of the scenario's form of control."""
+        return self.gains_of(self.control.form)
+
     @property
     def goal_distance(self) -> TorusDistance:
         """V of the planning system and of regulation."""
@@ -168,7 +180,11 @@ class Scenario:
             kappa=self.control.kappa,
             input=Input.VELOCITY if self.control.form == ControlForm.VELOCITY else Input.TORQUE,
             disturbances=self.disturbances.given,
-            settings={"seed": self.seed, **{key: asdict(getattr(self, key)) for key in _SETTINGS}},
+            settings={
+                "seed": self.seed,
+                **{key: asdict(getattr(self, key)) for key in _SETTINGS},
+                "gains": asdict(self.law_gains),
+            },
         )
 
     @classmethod
@@ -189,7 +205,10 @@ class Scenario:
             **{key: getattr(task, key) for key in _SHARED},
             seed=settings.get("seed", 0),
             disturbances=parse_table("disturbances", Disturbances, task.disturbances),
-            **{key: parse_table(key, TABLES[key], tables.get(key, {})) for key in _SETTINGS},
+            **{
+                key: parse_table(key, TABLES[key], tables.get(key, {}))
+                for key in (*_SETTINGS, "gains")
+            },
         )
 
 
@@ -201,12 +220,14 @@ TABLES: Mapping[str, type[Any]] = {
     "timing": TimingParameters,
     "speed": SpeedParameters,
     "gains": Gains,
+    "actuation": ActuationParameters,
     "simulation": SimulationParameters,
     "disturbances": Disturbances,
 }
 """The optional tables of a scenario file and what they hold."""
 
-_SETTINGS = ("control", "planning", "timing", "speed", "gains")  # that a task does not hold itself
+# What a task does not hold itself, beside the gains.
+_SETTINGS = ("control", "planning", "timing", "speed", "actuation")
 _OF_TASK = ("density", "sensing", "simulation", "plant")
 _SHARED = ("name", "title", "arm", "scene", "start", "goal", *_OF_TASK)
 _KEYS = {"title", "robot", "scene", "obstacles", "task", "plant", "seed", *TABLES}
@@ -253,7 +274,11 @@ def _parse(path: Path, data: dict[str, Any]) -> Scenario:
         goal=_configuration(arm, "task.goal", task.goal),
         plant=data.get("plant", PLANTS[0]),
         seed=data.get("seed", 0),
-        **{key: parse_table(key, kind, data.get(key, {})) for key, kind in TABLES.items()},
+        **{
+            key: parse_table(key, kind, data.get(key, {}))
+            for key, kind in TABLES.items()
+            if key != "gains" or key in data
+        },
     )
 
 

@@ -57,8 +57,8 @@ def simulate(
     Args:
         world: the arm among obstacles, as they are now.
         controller: called at each control period, with the time since the run began. Its
-            attributes `goal`, `motion`, `tracking_error`, `remark` and `describe_stall`, if any,
-            tell what it wants, how long it moves, and why it rests.
+            attributes `goal`, `motion`, `is_moving`, `tracking_error`, `remark` and
+            `describe_stall`, if any, tell what it wants, how long it moves, and why it rests.
         start: configuration (nq,).
         goal: configuration (nq,); None for the controller's own.
         plant: what is driven; None or "pinocchio" for the arm's model, "mujoco" for the same in
@@ -182,7 +182,9 @@ class _Loop:
                 outcome, detail = Outcome.COLLIDED, f"{touching} at t = {(k + 1) * p.dt:.3f} s"
                 break
             held = held + 1 if self._is_at_goal(q, v) else 0
-            if k * p.dt <= moves_until or self._distance(q, rest) > _STALL_MOTION:
+            moves = getattr(self.controller, "is_moving", None)
+            moves = k * p.dt <= moves_until if moves is None else moves
+            if moves or self._distance(q, rest) > _STALL_MOTION:
                 rest, rested_since = q, k
             if held * p.dt >= p.hold_time:
                 outcome, detail = Outcome.REACHED, ""

@@ -140,7 +140,7 @@ def test_a_task_that_no_scenario_wrote_is_one_by_default(swing_up: Scenario) -> 
     task = Task(swing_up.arm, swing_up.scene, swing_up.start, swing_up.goal, margin=0.01)
     scenario = Scenario.of_task(task)
     assert scenario.control == ControlParameters(margin=0.01)
-    assert (scenario.gains, scenario.seed, scenario.name) == (Gains(), 0, "run")
+    assert (scenario.gains, scenario.seed, scenario.name) == (None, 0, "run")
 
 
 def test_a_task_without_a_goal_is_no_scenario(swing_up: Scenario) -> None:
