@@ -105,7 +105,8 @@ class MujocoPlant:
             )
         self._is_arm = moved[self.model.geom_bodyid]
         self._last, self._contact = (np.full(arm.nq, np.nan), np.zeros(arm.nv)), ""
-        self._viewer, self._shown = None, 0.0
+        self._viewer: Any = None
+        self._shown = 0.0  # when [s]
         self._place_obstacles()
         if self._own:
             self._require_same_axes(names)
@@ -258,8 +259,8 @@ class MujocoPlant:
             along, slides = joint_axis(arm.model, k + 1)
             axis = pose.rotation @ along
             apart = self.data.xanchor[at] - pose.translation - arm.origin
-            turned = float(np.abs(self.data.xaxis[at] - axis).max())
-            off = 0.0 if slides else float(np.abs(apart - (apart @ axis) * axis).max())
+            turned = float(np.arccos(np.clip(self.data.xaxis[at] @ axis, -1.0, 1.0)))
+            off = 0.0 if slides else float(np.linalg.norm(apart - (apart @ axis) * axis))
             if max(turned, off) > _AWAY:
                 found = f"{1e3 * off:.3g} mm away, turned by {turned:.2g} rad"
                 allowed = "about the axis of the arm's joint, zero where it is zero"
