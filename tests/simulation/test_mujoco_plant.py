@@ -150,6 +150,19 @@ def test_a_run_ends_where_mujoco_finds_a_contact() -> None:
     assert abs(run.clearance[-1]) < 5e-3
 
 
+def test_what_diverges_leaves_no_file(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    arm = load_arm("two_link")
+    plant, state = MujocoPlant(World(arm, Scene())), (arm.configuration([0.0, 0.0]), np.zeros(2))
+    for k in range(20):
+        state = plant.step(*state, np.array([1e12, -1e12]) * (-1.0) ** k)
+    assert not np.isfinite(state[1]).all() or np.abs(state[1]).max() > 1e6
+    assert list(tmp_path.iterdir()) == []
+    assert capfd.readouterr().err == ""
+
+
 def test_without_mujoco_the_extra_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "mujoco", None)
     with pytest.raises(DensarmError, match=r"pip install 'densarm\[mujoco\]'"):
