@@ -268,6 +268,8 @@ class _RobotTable:
     cut_joints: tuple[str, ...] = ()
     base_placement: tuple[float, float, float, float, float, float, float] | None = None
     acceleration: tuple[float, ...] | None = None
+    torque_rate: tuple[float, ...] | float | None = None
+    jerk: tuple[float, ...] | float | None = None
     shapes: str | None = None
     collision_from_visual: str | None = None
     inertia: str | None = None
@@ -286,15 +288,14 @@ def _parse_robot(folder: Path, table: _RobotTable) -> Arm:
     if bool(name) == bool(urdf):
         allowed = "a table with either name or urdf"
         raise InvalidValueError("robot", {"name": name, "urdf": urdf}, allowed)
-    changes = {key: given.pop(key) for key in ("base_placement", "acceleration")}
-    changes = {key: value for key, value in changes.items() if value is not None}
+    placement = given.pop("base_placement")
     arm = load_arm(
         name or folder / urdf,
         srdf=folder / srdf if srdf else None,
         package_dirs=[folder / item for item in folders],
         **given,
     )
-    return Arm(replace(arm.description, **changes)) if changes else arm
+    return arm if placement is None else Arm(replace(arm.description, base_placement=placement))
 
 
 def _configuration(arm: Arm, key: str, value: str | tuple[float, ...]) -> Array:

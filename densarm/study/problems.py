@@ -382,6 +382,6 @@ def shortest_time(run: Run) -> float | None:
     path = SmoothPath(spline.t, spline.c)
     try:
         period = run.task.simulation.control_period
-        return time_path(arm, path, length, period, _ALL).duration
+        return time_path(arm, path, length, period, _ALL, has_rates=False).duration
     except PlanningError:
         return None
