@@ -231,7 +231,7 @@ def test_a_model_of_ones_own_may_be_disturbed_and_name_joints_otherwise(tmp_path
         (
             '"elbow"',
             '"wrist"',
-            r"shoulder, elbow'.*among those of the MJCF \(shoulder, wrist, grip\)",
+            "arm's, shoulder, elbow, are looked for, and the MJCF has shoulder, wrist, grip:",
         ),
         ('axis="0 -1 0"/>', 'axis="0 1 0"/>', r"^joint 'elbow' of the MJCF = .*turned by 3.1 rad"),
         ('pos="0 0 -1"><joint name="elbow"', 'pos="0 0 -0.9"><joint name="elbow"', "100 mm away"),
