@@ -251,7 +251,7 @@ def test_a_disturbed_arm_in_mujoco(
     path = tmp_path / "run.json"
     done = command("run", scenario_file(), "--plant", "mujoco", *told, "--json", path)
     assert (done.status, done.err) == (0, "")
-    assert "mujoco, mass_scale (1.0, 1.02), coulomb 0.01" in done.out
+    assert "mujoco, mass_scale [1.0, 1.02], coulomb 0.01" in done.out
     assert (
         "does not apply: the record says that the plant is mujoco, disturbed by coulomb" in done.out
     )
