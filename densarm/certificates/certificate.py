@@ -211,8 +211,8 @@ def _replay(task: Task, q: Array, v: Array, tau: Array) -> Check:
         return Check("replay", False, f"torque tells nothing: no mass of {lacking}", None, 0.0)
     disturbed = sorted(set(task.disturbances) - _OF_SENSORS)
     if task.plant != PLANTS[0] or disturbed:
-        why = f"disturbed by {', '.join(disturbed)}" if disturbed else "not the arm's model"
-        detail = f"does not apply: the plant ({task.plant}) is {why}, as the record says"
+        by = f", disturbed by {', '.join(disturbed)}" if disturbed else ""
+        detail = f"does not apply: the record says that the plant is {task.plant}{by}"
         return Check("replay", None, detail, None, 0.0)
     errors = np.append(replay_errors(task, q, v, tau), 0.0)
     worst = int(np.argmax(errors))

@@ -1,5 +1,6 @@
 """Disturbances: how an arm differs from its model, as data, and what that does to a loop."""
 
+import json
 from collections import deque
 from dataclasses import asdict, dataclass
 from typing import Any
@@ -109,7 +110,8 @@ class Disturbances:
         """What is not by default, as JSON data; empty for an arm that is its model."""
         default = Disturbances()
         told = {key: x for key, x in asdict(self).items() if x != asdict(default)[key]}
-        return told if set(told) - {"seed"} else {}
+        # Lists where there are tuples, as a record that was read again has them.
+        return dict(json.loads(json.dumps(told))) if set(told) - {"seed"} else {}
 
     @property
     def of_the_body(self) -> dict[str, Any]:

@@ -47,8 +47,8 @@ class MujocoPlant:
         joints: names of its joints, in the arm's order; None for those of the arm.
 
     Raises:
-        DensarmError: MuJoCo is not installed, or cannot make the model.
-        InvalidValueError: joints that the model does not have, or disturbances that it cannot.
+        DensarmError: MuJoCo is not installed, or cannot make the model, or it lacks joints.
+        InvalidValueError: joints elsewhere than the arm's, or disturbances that it cannot have.
         RobotDescriptionError: the arm has links without a mass.
 
     Source: https://mujoco.readthedocs.io/en/stable/computation
@@ -105,7 +105,8 @@ class MujocoPlant:
             )
         self._is_arm = moved[self.model.geom_bodyid]
         self._last, self._contact = (np.full(arm.nq, np.nan), np.zeros(arm.nv)), ""
-        self._viewer, self._shown = None, 0.0
+        self._viewer: Any = None
+        self._shown = 0.0  # when [s]
         self._place_obstacles()
         if self._own:
             self._require_same_axes(names)
@@ -133,7 +134,7 @@ class MujocoPlant:
 
         Raises:
             FileContentError: it cannot be read.
-            InvalidValueError: as `MujocoPlant`.
+            DensarmError: as `MujocoPlant`.
         """
         if not Path(path).is_file():
             raise FileContentError(path, "no such file")
@@ -157,6 +158,9 @@ class MujocoPlant:
         if self._placed != self._world.version:
             self._place_obstacles()
             is_new = True
+        told = mj.get_mju_user_warning()
+        # Of what diverges MuJoCo would write into a file where the process is.
+        mj.set_mju_user_warning(lambda _: None)
         if is_new:
             data.qvel[self._dofs] = v
             mj.mj_step1(model, data)
@@ -167,6 +171,7 @@ class MujocoPlant:
             mj.mj_step1(model, data)  # by halves, so that contacts are those of the state returned
             if data.ncon and not self._contact:
                 self._contact = self._deepest()
+        mj.set_mju_user_warning(told)
         q, v = self._world.arm.configurations(data.qpos[self._qpos]), data.qvel[self._dofs]
         self._last = q.copy(), v.copy()
         if self._viewer is not None and self._viewer.is_running():
@@ -258,8 +263,8 @@ class MujocoPlant:
             along, slides = joint_axis(arm.model, k + 1)
             axis = pose.rotation @ along
             apart = self.data.xanchor[at] - pose.translation - arm.origin
-            turned = float(np.abs(self.data.xaxis[at] - axis).max())
-            off = 0.0 if slides else float(np.abs(apart - (apart @ axis) * axis).max())
+            turned = float(np.arccos(np.clip(self.data.xaxis[at] @ axis, -1.0, 1.0)))
+            off = 0.0 if slides else float(np.linalg.norm(apart - (apart @ axis) * axis))
             if max(turned, off) > _AWAY:
                 found = f"{1e3 * off:.3g} mm away, turned by {turned:.2g} rad"
                 allowed = "about the axis of the arm's joint, zero where it is zero"
@@ -310,8 +315,11 @@ def _require_joints(spec: mujoco.MjSpec, names: Sequence[str], of_arm: Sequence[
     """Refuse a model without the joints that an arm has."""
     found = [joint.name for joint in spec.joints]
     if len(names) != len(of_arm) or not set(names) <= set(found):
-        allowed = f"among those of the MJCF ({', '.join(found)}); joints=[...] tells other names"
-        raise InvalidValueError("joints of the arm", ", ".join(names), allowed)
+        wanted = f"looked for as {', '.join(names)}" if tuple(names) != of_arm else "looked for"
+        raise DensarmError(
+            f"joints do not match: the arm's, {', '.join(of_arm)}, are {wanted}, and the MJCF has "
+            f"{', '.join(found) or 'none'}: rename them, or give the MJCF's names as joints=[...]"
+        )
 
 
 def _arm_spec(mj: Any, model: pin.Model) -> mujoco.MjSpec:

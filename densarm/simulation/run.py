@@ -42,8 +42,8 @@ class Run:
     v: Array
     """Velocities (N, nv) [rad/s or m/s]."""
     tau: Array
-    """Torque held from each sample to the next (N, nv) [N·m or N]; the last row repeats. Zero where
-    the plant is told velocities."""
+    """Torque commanded from each sample to the next (N, nv) [N·m or N], without what delays it; the
+    last row repeats. Zero where the plant is told velocities."""
     clearance: Array
     """Smallest signed distance over all pairs (N,) [m]; infinite without pairs."""
     outcome: Outcome

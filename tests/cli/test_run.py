@@ -251,8 +251,10 @@ def test_a_disturbed_arm_in_mujoco(
     path = tmp_path / "run.json"
     done = command("run", scenario_file(), "--plant", "mujoco", *told, "--json", path)
     assert (done.status, done.err) == (0, "")
-    assert "mujoco, mass_scale (1.0, 1.02), coulomb 0.01" in done.out
-    assert "replay          –    does not apply: the plant (mujoco) is disturbed by" in done.out
+    assert "mujoco, mass_scale [1.0, 1.02], coulomb 0.01" in done.out
+    assert (
+        "does not apply: the record says that the plant is mujoco, disturbed by coulomb" in done.out
+    )
     data = json.loads(path.read_text(encoding="utf-8"))
     assert data["plant"] == "mujoco"
     assert data["disturbances"] == {"mass_scale": [1.0, 1.02], "coulomb": 0.01}

@@ -5,6 +5,8 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from numpy.typing import ArrayLike
 
 from densarm.arms.arm import load_arm
@@ -107,6 +109,25 @@ def test_dry_friction_slows_and_holds(world: World, name: str) -> None:
     for _ in range(200):
         at = plant.step(*at, hold + 3.0 * dry)
     assert np.abs(at[1]).max() > 0.1
+
+
+@given(
+    angles=st.lists(st.floats(-2.0, 2.0), min_size=7, max_size=7),
+    speeds=st.lists(st.floats(-1.0, 1.0) | st.just(0.0), min_size=7, max_size=7),
+    extra=st.lists(st.floats(-5.0, 5.0), min_size=7, max_size=7),
+    dry=st.lists(st.floats(0.0, 3.0), min_size=7, max_size=7),
+)
+@settings(max_examples=50, deadline=None)
+def test_dry_friction_is_within_bounds_and_against_the_motion(
+    panda: World, angles: list[float], speeds: list[float], extra: list[float], dry: list[float]
+) -> None:
+    arm, most, v = panda.arm, np.array(dry), np.array(speeds)
+    q = arm.configuration(angles)
+    bias, mass = arm.nonlinear_effects(q, v), arm.mass_matrix(q)
+    _, after = plant_named(panda, "pinocchio", coulomb=tuple(dry)).step(q, v, bias + extra)
+    friction = np.array(extra) - mass @ (after - v) / DT
+    assert (np.abs(friction) <= most + 1e-6).all()
+    np.testing.assert_allclose(friction * after, most * np.abs(after), atol=1e-6)
 
 
 def test_dry_friction_takes_energy_from_a_swing_until_it_rests(world: World) -> None:

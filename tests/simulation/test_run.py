@@ -299,6 +299,8 @@ def test_summary(swing_up_run: Run) -> None:
         "plan_time_s",
         "preparation_time_s",
         "certified",
+        "plant",
+        "disturbances",
     ]
     assert json.loads(json.dumps(summary)) == summary
     assert summary["outcome"] == "reached"
