@@ -32,7 +32,7 @@ _FIRST_WINDOW, _LARGEST_WINDOW = 0.01, 0.5  # of the motion's duration
 _GROWTHS = math.inf, 1.1  # of the window at most, from one that is tried to the next
 _NEAR_ENOUGH = 0.95, 1.005  # share of the limits with which no other is tried
 _BENDS = 4  # rounds of slowing down where the window is not enough
-_BEARABLE = 1.015  # that all is slower for what a few samples need
+_BEARABLE, _TOO_FAST = 1.015, 1.5  # outside of which all is slowed down by what a few samples need
 _SEARCHED = 400  # samples that show well enough what a window does
 _SEARCH_SHARE = 0.985  # of the limits there; the rest is for what lies between them
 _WIDENINGS = 3  # of the window, which cost less than slowing down
@@ -50,6 +50,8 @@ class _Rates(NamedTuple):
     """Of acceleration (nv,) [rad/s³ or m/s³]."""
     torque: Array
     """Of torque, but for gravity's (nv,) [N·m/s or N/s]."""
+    torques: JointTorques
+    """Of the arm."""
 
 
 class _Shares(NamedTuple):
@@ -131,7 +133,7 @@ def time_path(
 
             window, bends = window or _window(duration, coarse), bends - 1
             shares = coarse(window)
-            if shares.needed.max() > _BEARABLE:
+            if _BEARABLE < shares.needed.max() < _TOO_FAST:
                 _lower_at_bends(cap, unit, grid, speed, window, shares.needed)
                 window *= min(max(1.0, float(shares.rate.max())), _GROWTHS[-1])
                 continue
@@ -153,8 +155,8 @@ def time_path(
 def _rate_limits(arm: Arm, parameters: TimingParameters) -> _Rates | None:
     """Return the limits of rates, None without any."""
     jerk = np.minimum(arm.limits.jerk, parameters.jerk or math.inf)
-    rates = _Rates(jerk, parameters.torque_rate_share * arm.limits.torque_rate)
-    return rates if np.isfinite(rates).any() else None
+    torque = parameters.torque_rate_share * arm.limits.torque_rate
+    return _Rates(jerk, torque, JointTorques(arm)) if np.isfinite([jerk, torque]).any() else None
 
 
 def _least_duration(arm: Arm, travel: Array, parameters: TimingParameters) -> Array:
@@ -341,7 +343,10 @@ def _shares(
     """
     limits, period, v = arm.limits, motion.period, motion.velocity
     q, start, end = arm.configurations(motion.position[:-1]), v[:-1], v[1:]
-    a, torques = (np.diff(v, axis=0) / period)[np.newaxis], JointTorques(arm)
+    a, torques = (
+        (np.diff(v, axis=0) / period)[np.newaxis],
+        rates.torques if rates else JointTorques(arm),
+    )
     if rates:
         rise = np.diff(motion.position, axis=0) / period
         a = np.append(a, [(6.0 * rise - 4.0 * start - 2.0 * end) / period], axis=0)
