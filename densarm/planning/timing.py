@@ -1,6 +1,8 @@
 """Timing of a path: time-optimal by TOPP-RA, and smoothed for limits of jerk and torque rate."""
 
 import math
+from collections.abc import Callable
+from functools import cache
 from typing import NamedTuple
 
 import numpy as np
@@ -26,10 +28,12 @@ _ROUNDS = 12  # of slowing down where stopping is not proved
 _HALVINGS = 7  # of the range that the largest speed to stop from is in
 _CAP_SHARE = 0.98  # of that speed; the rest is for what lies between grid points
 
-_WINDOWS = 6  # that smoothing is tried with at most
 _FIRST_WINDOW, _LARGEST_WINDOW = 0.01, 0.5  # of the motion's duration
-_NEAR_ENOUGH = 0.02  # to their limits, that none other is tried
-_SEARCHED = 400  # samples that show rates well enough to choose a window
+_GROWTHS = math.inf, 1.1  # of the window at most, from one that is tried to the next
+_NEAR_ENOUGH = 0.95, 1.005  # share of the limits with which no other is tried
+_BENDS = 4  # rounds of slowing down where the window is not enough
+_BEARABLE, _TOO_FAST = 1.015, 1.5  # outside of which all is slowed down by what a few samples need
+_SEARCHED = 400  # samples that show well enough what a window does
 _SEARCH_SHARE = 0.985  # of the limits there; the rest is for what lies between them
 _WIDENINGS = 3  # of the window, which cost less than slowing down
 
@@ -46,6 +50,22 @@ class _Rates(NamedTuple):
     """Of acceleration (nv,) [rad/s³ or m/s³]."""
     torque: Array
     """Of torque, but for gravity's (nv,) [N·m/s or N/s]."""
+    torques: JointTorques
+    """Of the arm."""
+
+
+class _Shares(NamedTuple):
+    """What the samples of a motion use of what it may."""
+
+    used: Array
+    """Of limits of velocity, acceleration and torque (N,)."""
+    rate: Array
+    """Of limits of rates, to the sample before or after (N,)."""
+
+    @property
+    def needed(self) -> Array:
+        """By how much each should be slower (N,)."""
+        return np.maximum(np.sqrt(self.used), np.cbrt(self.rate))
 
 
 def time_path(
@@ -91,7 +111,8 @@ def time_path(
     rates, least = _rate_limits(arm, parameters) if has_rates else None, shortest
     if rates:
         least = np.maximum(shortest, np.cbrt(32.0 * travel / rates.jerk))
-    for _ in range(_ROUNDS):
+    window, bends = 0.0, _BENDS if rates else 0
+    for _ in range(_ROUNDS + bends):
         speed = topp_ra.speeds(cap)
         if speed is None:
             _require_strength(arm, path, grid, parameters)
@@ -99,8 +120,26 @@ def time_path(
             # contradicting ones at times. Speeding up evenly, then braking, is a guess to slow.
             even = np.sqrt(8.0 * np.minimum(grid, 1.0 - grid)) / shortest.max()
             speed = np.minimum(unit * even, cap)
+        speed = speed / unit
+        duration = float(_times(grid, speed)[-1])
+        if bends and duration <= longest:
+
+            @cache
+            def coarse(window: float, speed: Array = speed, duration: float = duration) -> _Shares:
+                step = max(period, (duration + window) / _SEARCHED)
+                motion, _, _ = _sampled(path, grid, speed, step, window)
+                shares = _shares(arm, motion, parameters, rates)
+                return _Shares(*(share / _SEARCH_SHARE for share in shares))
+
+            window, bends = window or _window(duration, coarse), bends - 1
+            shares = coarse(window)
+            if _BEARABLE < shares.needed.max() < _TOO_FAST:
+                _lower_at_bends(cap, unit, grid, speed, window, shares.needed)
+                window *= min(max(1.0, float(shares.rate.max())), _GROWTHS[-1])
+                continue
+            bends = 0
         timing = _timing_within_limits(
-            arm, path, grid, speed / unit, period, parameters, rates, least, longest
+            arm, path, grid, speed, period, parameters, rates, window, least, longest
         )
         motion, _, _ = timing
         if stopping is None:
@@ -116,8 +155,8 @@ def time_path(
 def _rate_limits(arm: Arm, parameters: TimingParameters) -> _Rates | None:
     """Return the limits of rates, None without any."""
     jerk = np.minimum(arm.limits.jerk, parameters.jerk or math.inf)
-    rates = _Rates(jerk, parameters.torque_rate_share * arm.limits.torque_rate)
-    return rates if np.isfinite(rates).any() else None
+    torque = parameters.torque_rate_share * arm.limits.torque_rate
+    return _Rates(jerk, torque, JointTorques(arm)) if np.isfinite([jerk, torque]).any() else None
 
 
 def _least_duration(arm: Arm, travel: Array, parameters: TimingParameters) -> Array:
@@ -135,19 +174,17 @@ def _timing_within_limits(
     period: float,
     parameters: TimingParameters,
     rates: _Rates | None,
+    window: float,
     shortest: Array,
     longest: float,
 ) -> _Timing:
-    window = 0.0
-    if rates and _times(grid, speed)[-1] <= longest:
-        slower, window = _window(arm, path, grid, speed, period, parameters, rates)
-        speed, window = speed / slower, slower * window
     for attempt in range(_SLOWDOWNS):
         duration = float(_times(grid, speed)[-1]) + window
         if duration > longest:
             raise _too_slow(arm, shortest, duration, period, longest)
         timing = _sampled(path, grid, speed, period, window)
-        used, rate = _largest_shares(arm, timing[0], parameters, rates)
+        shares = _shares(arm, timing[0], parameters, rates)
+        used, rate = float(shares.used.max()), float(shares.rate.max())
         if used <= 1.0 and rate <= 1.0:
             return timing
         if used <= 1.0 and attempt < _WIDENINGS:
@@ -195,35 +232,37 @@ def _times(grid: Array, speed: Array) -> Array:
     return np.append(0.0, np.cumsum(2.0 * np.diff(grid) / (speed[:-1] + speed[1:])))
 
 
-def _window(
-    arm: Arm,
-    path: SmoothPath,
-    grid: Array,
-    speed: Array,
-    period: float,
-    parameters: TimingParameters,
-    rates: _Rates,
-) -> tuple[float, float]:
-    """Return how much slower a timing may be, and then smoothed over which window [s] at least.
+def _window(duration: float, coarse: Callable[[float], _Shares]) -> float:
+    """Return over which time [s] to smooth a timing.
 
-    A window w divides by w what rates jumps of acceleration have, slowing down by k divides all
-    by k³. The pair with the shortest motion is taken, among windows that each are as much wider
-    than the one before as its rates exceeded their limits.
+    Its length divides the steps of acceleration. What else rates have, of bends that are passed
+    too fast, it leaves.
     """
-    duration = float(_times(grid, speed)[-1])
-    step = max(period, duration / _SEARCHED)
-    window, best, shortest = _FIRST_WINDOW * duration, (1.0, 0.0), math.inf
-    for _ in range(_WINDOWS):
-        motion, _, _ = _sampled(path, grid, speed, step, window)
-        shares = _largest_shares(arm, motion, parameters, rates)
-        used, rate = (share / _SEARCH_SHARE for share in shares)
-        slower = max(1.0, math.sqrt(used), math.cbrt(rate))
-        if slower * (duration + window) < shortest:
-            best, shortest = (slower, window), slower * (duration + window)
-        if abs(rate - 1.0) < _NEAR_ENOUGH or duration + window > shortest:
+    window, most = _FIRST_WINDOW * duration, _LARGEST_WINDOW * duration
+    for growth in _GROWTHS:
+        rate = float(coarse(window).rate.max())
+        if _NEAR_ENOUGH[0] < rate < _NEAR_ENOUGH[1]:
             break
-        window = min(max(rate * window, period), _LARGEST_WINDOW * duration)
-    return best
+        window = min(min(rate, growth) * window, most)
+    return window
+
+
+def _lower_at_bends(
+    cap: Array, unit: float, grid: Array, speed: Array, window: float, needed: Array
+) -> None:
+    """Lower the caps on path speed [1/unit] where samples need to be slower by factors (N,).
+
+    A sample of a timing averaged over a window [s] is of all speeds [1/s] in it.
+    """
+    time = _times(grid, speed)
+    at = np.linspace(0.0, time[-1] + window, len(needed) + 1)
+    first = np.maximum(np.searchsorted(time, at[:-1] - window) - 1, 0)
+    last = np.searchsorted(time, at[1:]) + 1
+    slower = np.ones_like(cap)
+    for k in np.flatnonzero(needed > 1.0):
+        cells = slice(first[k], last[k])
+        slower[cells] = np.maximum(slower[cells], needed[k])
+    cap[:] = np.where(slower > 1.0, np.minimum(cap, unit * speed / slower), cap)
 
 
 def _sampled(
@@ -294,36 +333,40 @@ def _lower(
     np.minimum.at(cap, cell + 1, allowed)
 
 
-def _largest_shares(
+def _shares(
     arm: Arm, motion: Motion, parameters: TimingParameters, rates: _Rates | None
-) -> tuple[float, float]:
-    """Return the largest share that a motion uses of what it may of its limits, and of its rates.
+) -> _Shares:
+    """Return what a motion uses at its knots.
 
-    Samples are those at the knots whose acceleration is the mean up to the next knot, as for
-    torques that are held; for rates also those at the knots themselves. It rests before and after.
+    Accelerations are the means up to the next knot, as for torques that are held; with limits of
+    rates also those at the knot itself. It rests before and after.
     """
     limits, period, v = arm.limits, motion.period, motion.velocity
     q, start, end = arm.configurations(motion.position[:-1]), v[:-1], v[1:]
-    a, torques = (np.diff(v, axis=0) / period)[np.newaxis], JointTorques(arm)
+    a, torques = (
+        (np.diff(v, axis=0) / period)[np.newaxis],
+        rates.torques if rates else JointTorques(arm),
+    )
     if rates:
         rise = np.diff(motion.position, axis=0) / period
         a = np.append(a, [(6.0 * rise - 4.0 * start - 2.0 * end) / period], axis=0)
     torque = torques(np.array([q] * len(a)), np.array([start] * len(a)), a)
-    used = (
-        np.abs(v) / (parameters.velocity_share * limits.velocity),
-        np.abs(a) / (parameters.acceleration_share * limits.acceleration),
-        np.abs(torque) / (parameters.torque_share * limits.effort),
-    )
-    rate = 0.0
+    used = np.abs(start) / (parameters.velocity_share * limits.velocity)
+    for rows, limit in (
+        (a[:1], parameters.acceleration_share * limits.acceleration),
+        (torque[:1], parameters.torque_share * limits.effort),
+    ):
+        used = np.maximum(used, (np.abs(rows) / limit).max(axis=0))
+    rate = np.zeros_like(used)
     if rates:
         # Gravity's torque has no corners, unlike the rest.
         known = np.unique(np.append(np.arange(0, len(q), _WEIGHED), len(q) - 1))
         weights = torques(q[known], 0.0 * start[known], 0.0 * start[known])
         weight = [np.interp(np.arange(len(q)), known, column) for column in weights.T]
         for rows, limit in ((a, rates.jerk), (torque - np.transpose(weight), rates.torque)):
-            steps = np.abs(np.diff(rows, axis=1, prepend=0.0, append=0.0)).max(axis=(0, 1))
-            rate = max(rate, float((steps / (period * limit)).max()))
-    return max(float(share.max()) for share in used), rate
+            steps = np.abs(np.diff(rows, axis=1, prepend=0.0, append=0.0)).max(axis=0)
+            rate = np.maximum(rate, np.maximum(steps[:-1], steps[1:]) / (period * limit))
+    return _Shares(used.max(axis=1), rate.max(axis=1))
 
 
 def _unstoppable(arm: Arm, angles: Array) -> PlanningError:
