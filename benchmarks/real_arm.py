@@ -21,14 +21,18 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pinocchio as pin
+from numpy.typing import ArrayLike
 
 import densarm
 from densarm.certificates.task import REACHED_POSITION, REACHED_VELOCITY
 from densarm.cli.output import print_table
+from densarm.control.disturbance_observer import ActuationParameters
 from densarm.planning.plan import plan_path
 from densarm.scene.loading import MotionProblem
 from densarm.simulation.disturbances import Disturbances, Push
 from densarm.study.problems import in_processes, scenario_of
+from densarm.values.arrays import Array
 from densarm.values.outcome import Outcome
 from densarm.world.stopping import StoppingCheck, StoppingTrajectory
 
@@ -40,26 +44,47 @@ REST = 1.0  # [s] for which the goal is held before a run ends
 LONGEST = 5.0  # [s] after the motion's end
 
 
-def tracking(world: densarm.World, motion: densarm.Motion, delay: float) -> densarm.Controller:
-    """The controller of a motion, told a delay [s]."""
-    del delay
-    return densarm.DensityTracking(world, motion)
+class Tracking(densarm.DensityTracking):
+    """The controller of a motion, told a delay [s], that keeps where its reference was."""
+
+    def __init__(self, world: densarm.World, motion: densarm.Motion, delay: float) -> None:
+        self.reference: list[Array] = []
+        super().__init__(world, motion, actuation=ActuationParameters(delay=delay))
+
+    def torque(self, t: float, q: ArrayLike, v: ArrayLike) -> Array:
+        """Act as `DensityTracking.torque`."""
+        tau = super().torque(t, q, v)
+        self.reference.append(self.motion.sample(self.reference_time).position)
+        return tau
 
 
 def regulation(
     scenario: densarm.Scenario, path: densarm.GuidePath, delay: float
 ) -> densarm.Controller:
     """The controller to a goal by way of a path, told a delay [s]."""
-    del delay
     return densarm.DensityRegulation(
-        scenario.world, scenario.goal, path=path, margin=scenario.control.margin
+        scenario.world,
+        scenario.goal,
+        path=path,
+        margin=scenario.control.margin,
+        actuation=ActuationParameters(delay=delay),
     )
 
 
-def tracking_error(run: densarm.Run, motion: densarm.Motion) -> float:
-    """Largest error of a joint against the motion [rad]."""
-    wanted = np.array([motion.sample(t).position for t in run.time])
-    return float(np.abs(run.task.arm.angles(run.q) - wanted).max())
+def tracking_error(run: densarm.Run, controller: densarm.Controller) -> float | None:
+    """Largest error of a joint against the reference where it was then [rad]; None without one."""
+    if not isinstance(controller, Tracking):
+        return None
+    wanted = np.array(controller.reference[-len(run.q) + 1 :])  # calls before it load kernels
+    return float(np.abs(run.task.arm.angles(run.q[:-1]) - wanted).max())
+
+
+def torque_rate(run: densarm.Run) -> float:
+    """Largest change of torque without gravity in a millisecond, the first included [N·m]."""
+    arm = run.task.arm
+    gravity = [pin.computeGeneralizedGravity(arm.model, arm.data, q).copy() for q in run.q]
+    free = np.vstack([np.zeros(arm.nv), run.tau - gravity])
+    return float(np.abs(np.diff(free, axis=0)).max())
 
 
 def ended_at_goal(run: densarm.Run) -> bool:
@@ -110,7 +135,7 @@ CASES = {
     "delay 2 ms": delayed(0.002),
     "delay 5 ms": delayed(0.005),
     "delay 2 ms undeclared": Case(Disturbances(torque_delay=0.002)),
-    "all": Case(Disturbances(**ALL), declared=0.002),
+    "all": Case(Disturbances(**ALL)),
     "pushes": Case(pushes=PUSHES),
 }
 
@@ -131,6 +156,10 @@ class Result:
     """Left at the end [rad]."""
     clearance: float
     """Smallest, by coal [m]."""
+    rate: float
+    """Largest change of torque without gravity in a millisecond [N·m]."""
+    duration: float
+    """Of the run [s]."""
 
 
 def run_cases(
@@ -143,7 +172,7 @@ def run_cases(
     motion, moves = None, LONGEST
     if form == "tracking":
         motion = densarm.plan_motion(world, scenario.start, scenario.goal, **law)
-        make, moves = partial(tracking, world, motion), motion.duration
+        make, moves = partial(Tracking, world, motion), motion.duration
     else:
         path = plan_path(world, scenario.start, scenario.goal, **law).path
         make = partial(regulation, scenario, path)
@@ -156,9 +185,10 @@ def run_cases(
                 time_limit=moves + REST + LONGEST,
                 stall_time=2.0,
             )
+            controller = make(CASES[name].declared)
             run = densarm.simulate(
                 world,
-                make(CASES[name].declared),
+                controller,
                 scenario.start,
                 plant="mujoco",
                 disturbances=told,
@@ -171,9 +201,11 @@ def run_cases(
                     str(run.outcome),
                     run.detail,
                     ended_at_goal(run),
-                    tracking_error(run, motion) if motion else None,
+                    tracking_error(run, controller),
                     run.goal_error,
                     float(run.clearance.min()),
+                    torque_rate(run),
+                    float(run.time[-1]),
                 )
             )
     return results
@@ -219,6 +251,8 @@ def rows(results: Sequence[Result]) -> list[dict[str, str]]:
                 "error [mrad]": f"{1e3 * np.median(errors):.2f}" if errors else "",
                 "worst": f"{1e3 * np.max(errors):.2f}" if errors else "",
                 "rest [mrad]": f"{1e3 * np.median([r.rest for r in found]):.2f}",
+                "rate [N·m/ms]": f"{np.max([r.rate for r in found]):.2f}",
+                "time [s]": f"{np.median([r.duration for r in found]):.2f}",
                 "worst rest": f"{1e3 * np.max([r.rest for r in found]):.2f}",
             }
         )

@@ -15,9 +15,10 @@ from densarm.values.kernels import compiled, compiled_part
 # Rows of the observer's table: the estimate now, and when a torque sent now acts.
 ANGLE, VELOCITY, DISTURBANCE, AHEAD_ANGLE, AHEAD_VELOCITY = 0, 1, 2, 3, 4
 FREE = 5  # the torque sent last, without the gravity then
-_NONLINEAR, _GRAVITY, _INNOVATION, _ACCELERATION, _LARGEST = 6, 7, 8, 9, 10
-N_ROWS = 11
+_NONLINEAR, _GRAVITY, _INNOVATION, _ACCELERATION, _LARGEST, _JITTER = 6, 7, 8, 9, 10, 11
+N_ROWS = 12
 
+_JITTER_SHARE = 0.0012  # of the torque limits, by which noise may move a disturbance in a period
 _TRUSTED_SHARE = 0.9  # of the torque limits, that a disturbance may be taken to have
 _LONGEST_STEP = 0.1  # [s] between two calls, after which the observer begins anew
 _MOST_PERIODS = 1000  # of a delay
@@ -35,13 +36,16 @@ class ActuationParameters:
     delay: float = 0.0
     """Time until a torque that is sent acts, to the nearest period [s]."""
     bandwidth: float = 160.0
-    """Poles of the disturbance observer [1/s]; lower where torque is late. Zero for none."""
+    """Poles of the disturbance observer [1/s]; lower where torque is late, or noise would make it
+    shake. Zero for none."""
+    velocity_noise: float = 0.01
+    """Standard deviation of a measured velocity [rad/s or m/s]."""
     inertia_floor: float = 0.03
     """D, inertia that feedback reckons with beside the model's, which leaves out gears and rotors
     [kg·m² or kg]; less where torque is late."""
 
     def __post_init__(self) -> None:
-        for name in ("delay", "bandwidth", "inertia_floor"):
+        for name in ("delay", "bandwidth", "velocity_noise", "inertia_floor"):
             non_negative(name, getattr(self, name))
 
 
@@ -52,10 +56,12 @@ class DisturbanceObserver:
 
         \hat v^- = \hat v + \Delta t\, M^{-1} (\tau + \hat d - H), \quad r = v - \hat v^-, \quad
         \hat v = \hat v^- + (1 - \lambda^2)\, r, \quad
-        \hat d \mathrel{+}= \frac{(1 - \lambda)^2}{\Delta t} M r
+        \hat d \mathrel{+}= M \frac{(1 - \lambda)^2}{\Delta t} r
 
-    τ is what acted since the last call, which a delay makes an older one; λ = exp(-L Δt), so that
-    both poles are at L, the bandwidth. The state when a torque sent now acts is predicted by those
+    τ is what acted since the last call, which a delay makes an older one. λ is a diagonal matrix:
+    exp(-L Δt), so that both poles are at L, the bandwidth; or larger, so that the noise of a
+    measured velocity moves the disturbance of its joint by no more than a thousandth of the torque
+    limit or so in a period. The state when a torque sent now acts is predicted by those
     on their way. It begins anew where time runs back or jumps.
 
     Args:
@@ -78,6 +84,9 @@ class DisturbanceObserver:
         self.parameters = parameters
         self.rows = rows
         self.rows[_LARGEST] = _TRUSTED_SHARE * arm.limits.effort
+        with np.errstate(divide="ignore"):
+            noise = np.float64(parameters.velocity_noise)
+            self.rows[_JITTER] = _JITTER_SHARE * arm.limits.effort / noise
         self.sent: Array = np.zeros((late + 2, arm.nv))
         self._joint_index: NDArray[np.int64] = arm.joint_index
         self._factor = np.zeros((arm.nv, arm.nv))
@@ -157,17 +166,16 @@ def _observe(  # noqa: C901  # one kernel, since every call has its cost
         return
     acting = size - 1 - min(int(delay / dt + 0.5), size - 1)
     pole = math.exp(-min(numbers[1], 1.0 / (dt + delay)) * dt)
-    keep, learn = 1.0 - pole * pole, (1.0 - pole) * (1.0 - pole) / dt
-    if numbers[1] == 0.0:
-        keep, learn = 1.0, 0.0
     _factorise(mass, factor)
     for i in range(nv):
         acceleration[i] = sent[acting, i] + disturbance[i] - rows[_NONLINEAR, i]
     _solve(factor, acceleration)
     for i in range(nv):
         predicted = velocity[i] + dt * acceleration[i]
-        innovation[i] = v[i] - predicted
-        velocity[i] = predicted + keep * innovation[i]
+        learn = min(1.0 - pole, math.sqrt(rows[_JITTER, i] * dt / mass[i, i]))
+        keep = 1.0 if numbers[1] == 0.0 else learn * (2.0 - learn)
+        velocity[i] = predicted + keep * (v[i] - predicted)
+        innovation[i] = learn * learn / dt * (v[i] - predicted)
         angle[i] += dt * predicted
         off = _position(q, joint_index, i) - angle[i]
         if joint_index[1, i]:
@@ -177,7 +185,7 @@ def _observe(  # noqa: C901  # one kernel, since every call has its cost
         momentum = 0.0
         for j in range(nv):
             momentum += (mass[i, j] if i <= j else mass[j, i]) * innovation[j]
-        most, found = rows[_LARGEST, i], disturbance[i] + learn * momentum
+        most, found = rows[_LARGEST, i], disturbance[i] + momentum
         disturbance[i] = most if found > most else -most if found < -most else found
         rows[AHEAD_ANGLE, i], rows[AHEAD_VELOCITY, i] = angle[i], velocity[i]
         rows[_NONLINEAR, i] = nonlinear[i]

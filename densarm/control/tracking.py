@@ -46,7 +46,7 @@ from densarm.world.near_pairs import least_distances
 from densarm.world.stopping import HELD_SHARE
 from densarm.world.world import DISTANCE_TOLERANCE, World
 
-TRACKING_GAINS = Gains(position=1600.0, velocity=80.0)
+TRACKING_GAINS = Gains(position=1400.0, velocity=80.0)
 """Of tracking, whose feedback no cap on accelerations weakens."""
 
 _INTERVAL = 0.02  # [s] of the motion between computed distances
@@ -181,9 +181,14 @@ class DensityTracking:
         return np.array(dynamics.rows[TORQUE])
 
     @property
+    def reference_time(self) -> float:
+        """The reference's own time σ at the last call [s]: it waits where the arm is held up."""
+        return float(self._numbers[_TIME])
+
+    @property
     def is_moving(self) -> bool:
-        """Whether the reference still moves, which waits where the arm is held up."""
-        return bool(self._numbers[_TIME] < self.motion.duration)
+        """Whether the reference still moves."""
+        return self.reference_time < self.motion.duration
 
     def velocity(self, t: float, q: ArrayLike, v: ArrayLike) -> Array:
         """Act as `VelocityController.velocity`, v being the velocity commanded last."""
