@@ -8,10 +8,17 @@ python benchmarks/smoothness.py --json smoothness.json
 - the largest change of the acceleration in one sample, in units of the acceleration limit, at the
   same place: M^-1 times the torque step. What a bounded acceleration can do is 2; a jerk that is
   bounded keeps it far below. Steps above 0.2 are counted.
+
+python benchmarks/smoothness.py --references
+
+- the largest jerk [rad/s³] and change of torque without gravity's [N·m/ms] of each planned motion,
+  between samples at its knots and between those a control law asks for there; at rest before and
+  after. The exit status is 1 where one exceeds the arm's limits.
 """
 
 import argparse
 import json
+import sys
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -23,7 +30,9 @@ from numpy.typing import NDArray
 import densarm
 from densarm import Run
 from densarm.arms.catalogue import scenario_paths
-from densarm.scenarios.scenario import ControlForm
+from densarm.arms.dynamics import JointTorques
+from densarm.scenarios.run import by_density
+from densarm.scenarios.scenario import ControlForm, Scenario
 from densarm.values.arrays import Array
 
 COUNTED = 0.01  # share of the acceleration limit that a sign must have
@@ -76,22 +85,46 @@ def counts(run: Run) -> dict[str, Any]:
     }
 
 
+def reference(scenario: Scenario) -> dict[str, Any]:
+    """The jerk and torque rate of the motion that a scenario's run tracks."""
+    arm, motion = scenario.arm, by_density(scenario).motion
+    assert motion is not None, "tracking has one"
+    jerk, rate = np.zeros(arm.nv), np.zeros(arm.nv)
+    for lead in (0.0, 0.5 * motion.period):
+        times = motion.samples(motion.period).time[:-1]
+        ends = [motion.sample(-1.0)], [motion.sample(motion.duration + 1.0)]
+        samples = [*ends[0], *(motion.sample(t, lead) for t in times), *ends[1]]
+        angles, v, a = np.stack(samples, axis=1)
+        q, torques = arm.configurations(angles), JointTorques(arm)
+        torque = torques(q, v, a) - torques(q, 0.0 * v, 0.0 * a)
+        jerk = np.maximum(jerk, np.abs(np.diff(a, axis=0)).max(axis=0) / motion.period)
+        rate = np.maximum(rate, np.abs(np.diff(torque, axis=0)).max(axis=0) / motion.period)
+    return {
+        "duration_s": motion.duration,
+        "jerk": float(jerk.max()),
+        "torque_rate": 1e-3 * float(rate.max()),
+        "within": bool((jerk <= arm.limits.jerk).all() and (rate <= arm.limits.torque_rate).all()),
+    }
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--scenarios", nargs="+", default=sorted(scenario_paths()))
+    parser.add_argument("--references", action="store_true", help="of planned motions alone")
     parser.add_argument("--json", metavar="FILE")
     args = parser.parse_args()
     rows: list[dict[str, Any]] = []
     for name in args.scenarios:
         scenario = densarm.load_scenario(name)
-        for form in ControlForm:
+        for form in [scenario.control.form] if args.references else ControlForm:
             try:
                 control = replace(scenario.control, form=form)
-                run = densarm.run(replace(scenario, control=control))
+                own = replace(scenario, control=control)
+                measured = reference(own) if args.references else counts(densarm.run(own))
             except densarm.DensarmError as error:
                 print(f"{scenario.name}, {form}: {error}")
                 continue
-            row = {"scenario": scenario.name, "form": str(form), **counts(run)}
+            row = {"scenario": scenario.name, "form": str(form), **measured}
             if not rows:
                 print("".join(f"{key:>17}" for key in row))
             rows.append(row)
@@ -99,6 +132,7 @@ def main() -> None:
             print("".join(f"{text:>17}" for text in texts), flush=True)
     if args.json:
         Path(args.json).write_text(json.dumps({"rows": rows}, indent=2), encoding="utf-8")
+    sys.exit(int(not all(row.get("within", True) for row in rows)))
 
 
 if __name__ == "__main__":

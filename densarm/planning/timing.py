@@ -343,10 +343,8 @@ def _shares(
     """
     limits, period, v = arm.limits, motion.period, motion.velocity
     q, start, end = arm.configurations(motion.position[:-1]), v[:-1], v[1:]
-    a, torques = (
-        (np.diff(v, axis=0) / period)[np.newaxis],
-        rates.torques if rates else JointTorques(arm),
-    )
+    torques = rates.torques if rates else JointTorques(arm)
+    a = (np.diff(v, axis=0) / period)[np.newaxis]
     if rates:
         rise = np.diff(motion.position, axis=0) / period
         a = np.append(a, [(6.0 * rise - 4.0 * start - 2.0 * end) / period], axis=0)

@@ -82,6 +82,18 @@ def test_robot_may_have_limits_of_its_own(task: Path) -> None:
         load_scenario(task)
 
 
+def test_jerk_may_be_limited_in_a_scenario(task: Path) -> None:
+    text = task.read_text()
+    task.write_text(text + "[timing]\njerk = 500\n")
+    scenario = load_scenario(task)
+    assert scenario.timing.jerk == 500.0
+    again = Scenario.of_task(Task.from_json(json.loads(json.dumps(scenario.task.to_json()))))
+    assert again.timing == scenario.timing
+    task.write_text(text + "[timing]\njerk = -1.0\n")
+    with pytest.raises(FileContentError, match=r"jerk = -1.0: must be a finite number > 0"):
+        load_scenario(task)
+
+
 def test_a_date_is_refused_by_its_key(task: Path) -> None:
     task.write_text(TASK.replace('"two_link"', "1979-05-27"))
     with pytest.raises(FileContentError, match=r"robot.name = datetime.date.*: must be a string"):

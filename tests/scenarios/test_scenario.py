@@ -131,7 +131,7 @@ def halved(parameters: Any) -> Any:
     changes = {
         key: max(1, value // 2) if isinstance(value, int) else 0.5 * value
         for key, value in asdict(parameters).items()
-        if not isinstance(value, str)
+        if not isinstance(value, str | None)
     }
     return replace(parameters, **changes)
 
