@@ -118,7 +118,8 @@ def plan_motion(
     """
     legs = _legs(world, margin, density, alpha, kappa, sensing)
     planned = _planned(legs, start, goal, guide, seed, path_margin, search)
-    points, kept, stuck, remark = planned.path.waypoints, planned.kept, "", ""
+    points, kept = planned.path.waypoints, planned.kept
+    stuck, remark = "", planned.path.remark
     if not planned.path.is_clear:
         curve = legs.curve_from_either_end(planned.path)
         # No more than the density would: where nothing is sensed it leads straight.
@@ -208,18 +209,22 @@ def _planned(
         if path.is_clear:
             kept = _kept_along(check, path.waypoints, kept)
         return PlannedPath(path, kept, time.perf_counter() - began)
-    stuck = ""
+    stuck, remark = "", ""
     if guide != "path":
         space = SeparatingPlanes(world, margin, kept)
         answer = DensityGuide(legs, space, search).plan(depart, arrive, seed)
         if isinstance(answer, GuidePath):
             kept = _kept_along(check, answer.waypoints, kept)
             return PlannedPath(answer, kept, time.perf_counter() - began)
-        stuck = answer.reason
+        stuck, remark = answer.reason, answer.remark
         if guide == "density":
             raise PlanningError(Outcome.STUCK, stuck)
-    path, kept = _searched(check, depart, arrive, path_margin, least, search, seed)
-    path = replace(path, stuck=stuck)
+    try:
+        path, kept = _searched(check, depart, arrive, path_margin, least, search, seed)
+    except PlanningError as error:
+        also = f"; the density alone is stuck: {stuck}" if stuck else ""
+        raise PlanningError(error.outcome, error.detail + also) from None
+    path = replace(path, stuck=stuck, remark=remark)
     return PlannedPath(path, kept, time.perf_counter() - began)
 
 
