@@ -53,8 +53,8 @@ _ATTEMPTS = ((1.0, 0.02), (0.25, 1.0), (0.05, 1.0))
 _AT_GOAL = 1e-7  # [rad or m]; a shorter way is left to feedback, for rounding shapes its curve
 
 _END_SHARE = 0.5  # of the clearance at start and goal that a path's margin may take
-_SMOOTH_SHARE = 0.7  # of what a path keeps that the smooth path near it keeps
-_HALVINGS = 7  # of what a path keeps, until that is proved
+_SMOOTH_SHARE = 0.8  # of what a path keeps that the smooth path near it keeps
+_HALVINGS = 8  # of what a path keeps, until that is proved
 _STOP_SHARE = 0.5  # of the smooth path's that stopping keeps too; the rest is for tracking errors
 
 
@@ -262,15 +262,15 @@ def _searched(
 
 def _kept_along(check: SweptCheck, points: Array, kept: Array) -> Array:
     """Return how much of what pairs shall keep (K,) [m] is proved along a polyline (N, nq)."""
-    if not kept.any():
-        return kept
-    met = np.min([check.distance_margin(q) for q in points], axis=0)
-    kept = np.clip(met, 0.0, kept)
-    for _ in range(_HALVINGS):
+    for halving in range(_HALVINGS):
         space = SeparatingPlanes(check.world, check.margin, kept)
-        if all(space.segment_is_clear(a, b) for a, b in pairwise(points)):
+        if not kept.any() or all(space.segment_is_clear(a, b) for a, b in pairwise(points)):
             return kept
-        kept = 0.5 * kept
+        if halving == 0:
+            met = np.min([check.distance_margin(q) for q in points], axis=0)
+            kept = np.clip(met, 0.0, kept)
+        else:
+            kept = 0.5 * kept
     return np.zeros_like(kept)
 
 
@@ -331,5 +331,8 @@ def inside_limits(check: SweptCheck, q: Array) -> Array:
     """
     arm, limits = check.arm, check.arm.limits
     low, high = limits.lower + _LIMIT_INSET, limits.upper - _LIMIT_INSET
-    inside = arm.configurations(np.clip(arm.angles(q), low, high))
+    angles = arm.angles(q)
+    if np.array_equal(angles, clipped := np.clip(angles, low, high)):
+        return q
+    inside = arm.configurations(clipped)
     return inside if check.segment_is_clear(q, inside) else q
