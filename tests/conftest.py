@@ -23,6 +23,7 @@ from densarm.scene.obstacles import Sphere
 from densarm.scene.scene import Scene
 from densarm.simulation.run import Run
 from densarm.values.arrays import Array
+from densarm.world.separating_planes import SeparatingPlanes
 from densarm.world.swept_check import SweptCheck
 from densarm.world.world import World
 
@@ -96,7 +97,7 @@ def make_guided(swing_up: Scenario) -> Callable[..., GuidedDensity]:
         )
         path: GuidePath | NoPath = GuidePath(np.stack(ends), is_clear=False)
         if guide != "direct":
-            path = PathGuide(arm, check).plan(*ends, 0)
+            path = PathGuide(arm, SeparatingPlanes(check.world, margin)).plan(*ends, 0)
         assert isinstance(path, GuidePath)
         goals = SubGoals(check, path, SensingParameters())
         return GuidedDensity(check, goals, TorusDistance(arm), DensityParameters(**parameters))

@@ -185,6 +185,7 @@ class NavigationDensity:
         self._space = space
         self.goal: Array = np.array(space.check_configuration("goal", goal))
         self.unsafe_sets = tuple(unsafe_sets)
+        self._curved = [item for item in unsafe_sets if isinstance(item, Curved)]
         self.goal_distance = goal_distance
         self.parameters = parameters
         self._exponents = {gauge: gauge_exponents(gauge, parameters.alpha) for gauge in Gauge}
@@ -238,9 +239,8 @@ class NavigationDensity:
     def write_curvature(self, q: Array, out: Array) -> None:
         """Write what the unsafe sets that are `Curved` add to `out` (nv, nv); q was updated."""
         out[:] = 0.0
-        for unsafe_set in self.unsafe_sets:
-            if isinstance(unsafe_set, Curved):
-                unsafe_set.add_curvature(q, self.parameters.theta, out)
+        for unsafe_set in self._curved:
+            unsafe_set.add_curvature(q, self.parameters.theta, out)
 
     def log_gradients(self, q: Array, steps: Array) -> Array:
         """Return ∇ ln ρ (..., nv) at all q ⊕ x, for steps x (..., nv) from q (nq,)."""

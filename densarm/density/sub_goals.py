@@ -45,6 +45,8 @@ class GuidePath:
     """What found it, as a phrase; empty for a guide of one's own."""
     stuck: str = ""
     """Where the density alone gets stuck, and what blocks it; empty where it was not so tried."""
+    remark: str = ""
+    """Which critical points of ρ the curves that were tried left, and how; empty for none."""
 
 
 class SubGoals:
@@ -192,6 +194,10 @@ class GuidedDensity:
         """
         self.world.require_version(self._version)
         self.density.update(q)
+        self.advance(q)
+
+    def advance(self, q: Array) -> None:
+        """Act as `update` where the density was evaluated last, at q (nq,)."""
         if self.sub_goals.advance(q, self.distances):
             self._point_at_sub_goal()
             self.density.update(q)

@@ -188,8 +188,9 @@ class JointLimitSet:
         """Act as `Curved.add_curvature`."""
         bound, side, width = self.member
         h = side * (q[self.index[1]] - bound)
-        for joint, h_k, width_k in zip(self.index[0], h, width, strict=True):
-            out[joint, joint] += bump_curvature(h_k, width_k, theta)
+        for k in np.flatnonzero(h < width):
+            joint = self.index[0, k]
+            out[joint, joint] += bump_curvature(h[k], width[k], theta)
 
 
 def sensed_sets(

@@ -96,31 +96,35 @@ class DensityGuide:
         # From the narrow end first, from which it fails more often.
         first, last = sorted((start, goal), key=self._room)
         curve, found_by, stuck = self._legs.curve_from_either_end(_pair(first, last)), ALONE, ""
-        way = curve.q if curve.reached else None
-        if way is None:
+        way, legs = curve.q, [curve]
+        if not curve.reached:
             stuck, found_by = self._legs.why_stuck(curve), BY_VIA_POINT
             bounds = SamplingBounds(arm, parameters, start, goal)
-            way = self._by_via_point(first, last, bounds, rng)
-        if way is None:
-            tried = f"; from none of {parameters.vias} via points it leads to both ends"
-            return NoPath(stuck + (tried if parameters.vias else ""))
+            found = self._by_via_point(first, last, bounds, rng)
+            if found is None:
+                tried = f"; from none of {parameters.vias} via points it leads to both ends"
+                return NoPath(stuck + (tried if parameters.vias else ""), curve.remark)
+            legs += found
+            way = np.vstack([found[0].q, found[1].q[-2::-1]])
         path = shortened(arm, self._freedom, way, parameters.shortcuts, rng)
         path = path if first is start else path[::-1]
-        return GuidePath(path, is_clear=True, found_by=found_by, stuck=stuck)
+        remark = "; ".join(filter(None, dict.fromkeys(leg.remark for leg in legs)))
+        return GuidePath(path, is_clear=True, found_by=found_by, stuck=stuck, remark=remark)
 
     def _room(self, q: Array) -> float:
         return self._legs.check.least_distance_margin(q[np.newaxis])
 
     def _by_via_point(
         self, first: Array, last: Array, bounds: SamplingBounds, rng: np.random.Generator
-    ) -> Array | None:
+    ) -> tuple[IntegralCurve, IntegralCurve] | None:
+        """Return curves from both ends to a via point."""
         for index in range(self._parameters.vias):
             via = self._via(bounds.everywhere if index % 2 else bounds.near, rng)
             leg = self._legs.curve(_pair(first, via))
             if leg.reached:
                 other = self._legs.curve(_pair(last, via))
                 if other.reached:
-                    return np.vstack([leg.q, other.q[-2::-1]])
+                    return leg, other
         return None
 
     def _via(self, bounds: Bounds, rng: np.random.Generator) -> Array:

@@ -42,7 +42,7 @@ class PlanningParameters:
     """Longest edge that the first search adds to its trees; the second adds edges up to twice as
     long, and so on, as neither suits all spaces [rad or m]."""
 
-    shortcuts: int = 600
+    shortcuts: int = 900
     """Shortcuts tried on a way that was found."""
 
     limit_margin: float = 0.02
@@ -72,6 +72,8 @@ class NoPath:
 
     reason: str
     """What was tried and what stood in the way, as a phrase."""
+    remark: str = ""
+    """As `GuidePath.remark`."""
 
 
 class Guide(Protocol):
@@ -104,4 +106,11 @@ class FreeSpace(Protocol):
 
     def segment_is_clear(self, q_a: Array, q_b: Array) -> bool:
         """Return whether all of a straight segment, ends (nq,), is proved free of contact."""
+        ...
+
+    def polyline_is_clear(self, angles: Array) -> bool:
+        """Return whether all straight segments from one to the next are proved free of contact.
+
+        Joint positions (N, nv) [rad or m], N >= 2; continuous joints count their turns.
+        """
         ...

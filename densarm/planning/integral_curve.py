@@ -1,5 +1,6 @@
 """The integral curve of the density from a start along its sub-goals: the planning system."""
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -7,6 +8,7 @@ import numpy as np
 from densarm.density.navigation_density import Gauge
 from densarm.density.sub_goals import SIGHT, GuidedDensity, SubGoals
 from densarm.values.arrays import Array
+from densarm.values.kernels import compiled
 from densarm.world.separating_planes import SeparatingPlanes
 
 _LONGEST_STEP = 0.3  # [rad]
@@ -74,8 +76,8 @@ class PlanningSystem:
         room = np.clip(_ROOM_SHARE * goals.distance_margin.min(axis=0), 0.0, _ROOM)
         clear = SeparatingPlanes(guided.world, self._margin, room)
         points, q, length, left = [start], start, _LONGEST_STEP, list[str]()
+        guided.update(start)
         for _ in range(_MOST_STEPS):
-            guided.update(q)
             error = density.error(q)
             if goals.is_last and np.abs(error).max() <= _ARRIVED:
                 ends = np.array([*points[:-1], goals.q[-1]])
@@ -93,6 +95,7 @@ class PlanningSystem:
                 left.append(how)
             q = q_next
             points.append(q)
+            guided.advance(q)
         remark = "; ".join(left)
         return IntegralCurve(np.array(points), reached=False, sub_goals=goals, remark=remark)
 
@@ -104,7 +107,7 @@ class PlanningSystem:
         return self.guided.describe_stall(curve.q[-1])
 
     def _in_sight(self, q: Array, error: Array) -> Array | None:
-        """Return the sub-goal if Ψ = 1 on the segment to it from q (nq,), which was updated.
+        """Return the sub-goal, updated, if Ψ = 1 on the segment to it from q (nq,), which was.
 
         There ρ depends on V alone, and grows along the segment.
         """
@@ -113,18 +116,23 @@ class PlanningSystem:
             return None
         goal = np.asarray(goals.q[goals.current])
         is_unsensed = self.guided.sub_goal_in_sight(q) is not None
-        return goal if is_unsensed or self._unsensed.segment_is_clear(q, goal) else None
+        if not is_unsensed and not self._unsensed.segment_is_clear(q, goal):
+            return None
+        self.guided.density.update(goal)
+        return goal
 
     def _step(self, q: Array, error: Array, length: float, clear: SeparatingPlanes) -> Array | None:
-        """Return the next point, at most so far [rad], or None where ρ grows no more."""
+        """Return the next point, updated, at most so far [rad], or None where ρ grows no more."""
         density, gradient = self.guided.density, self._gradient
         left = float(np.linalg.norm(error))
         if left <= length and clear.segment_is_clear(q, density.goal):
+            density.update(density.goal)
             return density.goal.copy()
         density.write_gradient(Gauge.LOG, gradient)
         density.write_curvature(q, self._curvature)
         before, length = density.log_value(), min(length, left)
         stiffness, axes = np.linalg.eigh(self._curvature)
+        np.maximum(stiffness, 0.0, out=stiffness)  # rounding
         pull = axes.T @ gradient
         while length > _SMALLEST_STEP:
             step = axes @ (pull / (_rate(pull, stiffness, length) + stiffness))
@@ -139,7 +147,7 @@ class PlanningSystem:
         return None
 
     def _leave(self, q: Array, clear: SeparatingPlanes) -> tuple[Array | None, str]:
-        """Return a point away from the critical point q (nq,), if there is one, and how."""
+        """Return a point away from the critical point q (nq,), updated, if any, and how."""
         guided, density = self.guided, self.guided.density
         density.update(q)
         before, direction = density.log_value(), guided.unstable_direction(q)
@@ -153,14 +161,16 @@ class PlanningSystem:
         return None, ""
 
 
+@compiled
 def _rate(pull: Array, stiffness: Array, length: float) -> float:
     """Return the least 1/τ, nearly, with which a step is no longer than a length [rad]."""
-    np.maximum(stiffness, 0.0, out=stiffness)  # rounding
-    high = float(np.linalg.norm(pull)) / length
+    high = math.sqrt((pull * pull).sum()) / length
     low = 1e-9 * high
     for _ in range(_SEARCHES):
-        middle = np.sqrt(low * high)
-        if np.linalg.norm(pull / (middle + stiffness)) > length:
+        middle, square = math.sqrt(low * high), 0.0
+        for j in range(pull.size):
+            square += (pull[j] / (middle + stiffness[j])) ** 2
+        if square > length * length:
             low = middle
         else:
             high = middle

@@ -53,8 +53,8 @@ _ATTEMPTS = ((1.0, 0.02), (0.25, 1.0), (0.05, 1.0))
 _AT_GOAL = 1e-7  # [rad or m]; a shorter way is left to feedback, for rounding shapes its curve
 
 _END_SHARE = 0.5  # of the clearance at start and goal that a path's margin may take
-_SMOOTH_SHARE = 0.7  # of what a path keeps that the smooth path near it keeps
-_HALVINGS = 7  # of what a path keeps, until that is proved
+_SMOOTH_SHARE = 0.8  # of what a path keeps that the smooth path near it keeps
+_HALVINGS = 8  # of what a path keeps, until that is proved
 _STOP_SHARE = 0.5  # of the smooth path's that stopping keeps too; the rest is for tracking errors
 
 
@@ -118,7 +118,8 @@ def plan_motion(
     """
     legs = _legs(world, margin, density, alpha, kappa, sensing)
     planned = _planned(legs, start, goal, guide, seed, path_margin, search)
-    points, kept, stuck, remark = planned.path.waypoints, planned.kept, "", ""
+    points, kept = planned.path.waypoints, planned.kept
+    stuck, remark = "", planned.path.remark
     if not planned.path.is_clear:
         curve = legs.curve_from_either_end(planned.path)
         # No more than the density would: where nothing is sensed it leads straight.
@@ -208,18 +209,22 @@ def _planned(
         if path.is_clear:
             kept = _kept_along(check, path.waypoints, kept)
         return PlannedPath(path, kept, time.perf_counter() - began)
-    stuck = ""
+    stuck, remark = "", ""
     if guide != "path":
         space = SeparatingPlanes(world, margin, kept)
         answer = DensityGuide(legs, space, search).plan(depart, arrive, seed)
         if isinstance(answer, GuidePath):
             kept = _kept_along(check, answer.waypoints, kept)
             return PlannedPath(answer, kept, time.perf_counter() - began)
-        stuck = answer.reason
+        stuck, remark = answer.reason, answer.remark
         if guide == "density":
             raise PlanningError(Outcome.STUCK, stuck)
-    path, kept = _searched(check, depart, arrive, path_margin, least, search, seed)
-    path = replace(path, stuck=stuck)
+    try:
+        path, kept = _searched(check, depart, arrive, path_margin, least, search, seed)
+    except PlanningError as error:
+        also = f"; the density alone is stuck: {stuck}" if stuck else ""
+        raise PlanningError(error.outcome, error.detail + also) from None
+    path = replace(path, stuck=stuck, remark=remark)
     return PlannedPath(path, kept, time.perf_counter() - began)
 
 
@@ -257,15 +262,15 @@ def _searched(
 
 def _kept_along(check: SweptCheck, points: Array, kept: Array) -> Array:
     """Return how much of what pairs shall keep (K,) [m] is proved along a polyline (N, nq)."""
-    if not kept.any():
-        return kept
-    met = np.min([check.distance_margin(q) for q in points], axis=0)
-    kept = np.clip(met, 0.0, kept)
-    for _ in range(_HALVINGS):
+    for halving in range(_HALVINGS):
         space = SeparatingPlanes(check.world, check.margin, kept)
-        if all(space.segment_is_clear(a, b) for a, b in pairwise(points)):
+        if not kept.any() or all(space.segment_is_clear(a, b) for a, b in pairwise(points)):
             return kept
-        kept = 0.5 * kept
+        if halving == 0:
+            met = np.min([check.distance_margin(q) for q in points], axis=0)
+            kept = np.clip(met, 0.0, kept)
+        else:
+            kept = 0.5 * kept
     return np.zeros_like(kept)
 
 
@@ -326,5 +331,8 @@ def inside_limits(check: SweptCheck, q: Array) -> Array:
     """
     arm, limits = check.arm, check.arm.limits
     low, high = limits.lower + _LIMIT_INSET, limits.upper - _LIMIT_INSET
-    inside = arm.configurations(np.clip(arm.angles(q), low, high))
+    angles = arm.angles(q)
+    if np.array_equal(angles, clipped := np.clip(angles, low, high)):
+        return q
+    inside = arm.configurations(clipped)
     return inside if check.segment_is_clear(q, inside) else q

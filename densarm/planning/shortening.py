@@ -11,7 +11,7 @@ from densarm.planning.guide import FreeSpace
 from densarm.values.arrays import Array
 from densarm.values.kernels import compiled, compiled_part
 
-_SPACINGS = 0.5, 0.3  # [rad or m] at most between points that tries start and end at, in turn
+_SPACINGS = 0.5, 0.25, 0.125  # [rad or m] at most between points that tries begin at, in turn
 _HALF_TURN = math.pi - 1e-9  # [rad], beyond which rounding decides which way round a proof goes
 _IN_VAIN = 150  # tries that gain nothing, after which no more are made
 _LEAST_GAIN = 3e-4  # of a path's length; a try that gains less is not worth a check
@@ -30,14 +30,15 @@ def shortened(
         arm: the joint space.
         freedom: proves segments.
         path: waypoints (W, nq), W >= 2.
-        tries: number of pairs of points, at least 2.
+        tries: number of pairs of points, at least one for each spacing.
         rng: draws them.
 
     Source: R. Geraerts, M. H. Overmars, Creating High-quality Paths for Motion Planning, IJRR 26
         (2007), section 3.
     """
+    each = tries // len(_SPACINGS)
     for spacing in _SPACINGS:
-        path = _straightened(arm, freedom, _resampled(arm, path, spacing), tries // 2, rng)
+        path = _straightened(arm, freedom, _resampled(arm, path, spacing), each, rng)
     return path
 
 
@@ -47,21 +48,19 @@ def _straightened(
     """Return what is left of the points of a path (W, nq) once ways between them are shorter."""
     angles, is_continuous = arm.angles(points), arm.continuous
     least = _LEAST_GAIN * _length(arm.difference(points[:-1], points[1:])).sum()
-    in_vain = 0
-    for _ in range(tries):
+    in_vain, room = 0, np.empty_like(angles)
+    joints = rng.integers(arm.nv + 1, size=tries).tolist()
+    ends = np.sort(rng.integers(len(points), size=(tries, 2))).tolist()
+    for joint, (begin, end) in zip(joints, ends, strict=True):
         if in_vain == _IN_VAIN:
             break
         in_vain += 1
-        joint = int(rng.integers(arm.nv + 1))
-        begin, end = (int(index) for index in np.sort(rng.integers(len(points), size=2)))
-        way = np.empty((end - begin + 1, arm.nv))
+        way = room[: end - begin + 1]
         if not _write_way(angles, is_continuous, begin, end, joint, way) > least:
             continue
-        candidate = arm.configurations(way)
-        candidate[[0, -1]] = points[[begin, end]]
-        checked = candidate[[0, -1]] if joint == arm.nv else candidate
-        if all(freedom.segment_is_clear(a, b) for a, b in pairwise(checked)):
-            points[begin : end + 1], angles[begin : end + 1] = candidate, way
+        if freedom.polyline_is_clear(way[:: end - begin] if joint == arm.nv else way):
+            points[begin + 1 : end] = arm.configurations(way[1:-1])
+            angles[begin : end + 1] = way
             in_vain = 0
     kept = [points[0]]
     for waypoint, after in pairwise(points[1:]):

@@ -31,6 +31,7 @@ from densarm.values.arrays import Array
 from densarm.values.checks import one_of
 from densarm.values.outcome import Outcome
 from densarm.world.swept_check import SweptCheck
+from densarm.world.world import World
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,29 +115,37 @@ def run_by(
     done = simulate_task(task, world, drive.controller, plant, told, on_progress)
     if done.outcome == Outcome.INFEASIBLE:
         return done
-    led_by, stuck = (drive.path.found_by, drive.path.stuck) if drive.path else ("", "")
-    return replace(
-        done, plan_time=drive.plan_time, preparation_time=elapsed, led_by=led_by, stuck=stuck
-    )
+    done = replace(done, plan_time=drive.plan_time, preparation_time=elapsed)
+    if (path := drive.path) is None:
+        return done
+    remark = "; ".join(filter(None, dict.fromkeys([path.remark, done.remark])))
+    return replace(done, led_by=path.found_by, stuck=path.stuck, remark=remark)
 
 
-def by_density(scenario: Scenario, guide: Guide | None = None, *, replans: bool = True) -> Drive:
+def by_density(
+    scenario: Scenario,
+    guide: Guide | None = None,
+    *,
+    world: World | None = None,
+    replans: bool = True,
+) -> Drive:
     """Return what drives an arm by the density, in the scenario's form and along its guide.
 
-    A guide replaces the scenario's own. Where the plan loses the arm there is a new one, if it
-    `replans`, and torque, not velocity, drives the arm.
+    A guide replaces the scenario's own, and so does a world. Where the plan loses the arm there is
+    a new one, if it `replans`, and torque, not velocity, drives the arm.
 
     Raises:
         PlanningError: there is no way, or, without a guide's path, the density is stuck at once.
     """
-    drive = _plan(scenario, scenario.start, guide)
+    world = world or scenario.world
+    drive = _plan(scenario, world, scenario.start, guide)
     is_told_velocity = scenario.control.form == ControlForm.VELOCITY
     if not replans or is_told_velocity or (guide is None and scenario.control.guide == "direct"):
         return drive
 
     def plan_again(q: Array) -> Controller | None:
         try:
-            return _plan(scenario, q, guide).controller
+            return _plan(scenario, world, q, guide).controller
         except PlanningError:
             return None
 
@@ -152,8 +161,8 @@ def by_density(scenario: Scenario, guide: Guide | None = None, *, replans: bool 
     return replace(drive, controller=controller)
 
 
-def _plan(scenario: Scenario, start: Array, guide: Guide | None) -> Drive:
-    world, control, period = scenario.world, scenario.control, scenario.simulation.control_period
+def _plan(scenario: Scenario, world: World, start: Array, guide: Guide | None) -> Drive:
+    control, period = scenario.control, scenario.simulation.control_period
     goal, chosen = scenario.goal, control.guide if guide is None else guide
     search: dict[str, Any] = {
         "margin": control.margin,

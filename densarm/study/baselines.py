@@ -217,8 +217,8 @@ def _scaled(scenario: Scenario, scale: float) -> SensingParameters:
 def _by_density(scenario: Scenario, scale: float, form: ControlForm, guide: str) -> Drive:
     control = replace(scenario.control, form=form, guide=guide)
     chosen = replace(scenario, control=control, sensing=_scaled(scenario, scale))
-    vars(chosen)["world"] = scenario.world  # not one of its own, in which nothing would move
-    return by_density(chosen, replans=False)
+    # Not in a world of its own, in which nothing would move.
+    return by_density(chosen, world=scenario.world, replans=False)
 
 
 def _follow(scenario: Scenario, field: type[BarrierField], *parameters: float) -> Drive:

@@ -4,8 +4,6 @@ A pose is a row of twelve numbers: the rotation matrix, row by row, then the tra
 """
 
 import math
-from collections.abc import Iterable
-from itertools import pairwise
 from typing import NamedTuple
 from weakref import WeakKeyDictionary
 
@@ -14,6 +12,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
+from densarm.arms.arm import Arm
 from densarm.arms.joint_space import joint_axis
 from densarm.scene.shapes import box_hull, convex_hull, extreme_points
 from densarm.values.arrays import Array
@@ -75,6 +74,16 @@ def _bodies(world: World) -> tuple[Bodies, Integers]:
     shapes, model = list(world.geometry_model.geometryObjects), world.arm.model
     hulls = [_hull(item.geometry) for item in shapes]
     corners, radii = zip(*map(extreme_points, hulls), strict=True)
+    own = _NEIGHBOURS.setdefault(world.arm, {})
+    neighbours = [
+        own.get(item.name) or _neighbours(hull, len(each), radius)
+        for item, hull, each, radius in zip(shapes, hulls, corners, radii, strict=True)
+    ]
+    own |= {
+        item.name: near
+        for item, near in zip(shapes, neighbours, strict=True)
+        if item.parentJoint > 0
+    }
     first, radius = np.cumsum([0, *map(len, corners)]), np.array(radii)
     low, high = (np.array([end(each, axis=0) for each in corners]) for end in (np.min, np.max))
     middles = 0.5 * (low + high)
@@ -102,7 +111,7 @@ def _bodies(world: World) -> tuple[Bodies, Integers]:
         joint=joint,
         shapes=np.column_stack([np.array(frames), box, reach, radius, world.shape_lipschitz]),
         points=np.vstack(centred),
-        edges=_edges(hulls, radii, first),
+        edges=_edges(neighbours, first),
         pairs=np.column_stack([pairs, last]),
     )
     return bodies, first[pairs]
@@ -125,17 +134,25 @@ def _pose(item: pin.GeometryObject) -> pin.SE3:
     return pin.SE3(turn, (shape.d + normal @ pose.translation) * normal)
 
 
-def _edges(
-    hulls: list[coal.CollisionGeometry], radii: Iterable[float], first: Integers
-) -> Integers:
-    """Return `Bodies.edges`; all corners of a round shape are each other's neighbours."""
-    neighbours = [
-        [begin + other for other in (hull.neighbors(k) if radius == 0.0 else range(end - begin))]
-        for hull, radius, (begin, end) in zip(hulls, radii, pairwise(first.tolist()), strict=True)
-        for k in range(end - begin)
-    ]
-    ends = len(neighbours) + 1 + np.cumsum([0, *map(len, neighbours)])
-    return np.concatenate([ends, *neighbours]).astype(np.int64)
+_Neighbours = tuple[Integers, Integers]
+"""Numbers of neighbours of a hull's corners, and the neighbours, one corner after the other."""
+
+# coal tells them corner by corner, and an arm among obstacles that move is made anew each time.
+_NEIGHBOURS: WeakKeyDictionary[Arm, dict[str, _Neighbours]] = WeakKeyDictionary()
+
+
+def _neighbours(hull: coal.CollisionGeometry, corners: int, radius: float) -> _Neighbours:
+    """Return a hull's neighbours; all corners of a round shape are each other's."""
+    found = [hull.neighbors(k) if radius == 0.0 else range(corners) for k in range(corners)]
+    return np.array([*map(len, found)]), np.concatenate([*map(np.array, found)])
+
+
+def _edges(neighbours: list[_Neighbours], first: Integers) -> Integers:
+    """Return `Bodies.edges`."""
+    counts = np.concatenate([count for count, _ in neighbours])
+    ends = len(counts) + 1 + np.append(0, np.cumsum(counts))
+    others = [begin + near for begin, (_, near) in zip(first, neighbours, strict=False)]
+    return np.concatenate([ends, *others]).astype(np.int64)
 
 
 def _pose_row(placement: pin.SE3) -> Array:

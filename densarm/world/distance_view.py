@@ -18,7 +18,7 @@ from densarm.values.arrays import Array
 from densarm.values.kernels import compiled, compiled_part
 
 _FIELDS = 10  # distance 1, normal 3, nearest point on body 1 and on body 2, 3 each
-_COMPARED = 100  # pairs at most, evenly spread, of which both layouts are compared
+_COMPARED = 20  # pairs at most, evenly spread, of which both layouts are compared
 
 
 class DistanceView:

@@ -1,4 +1,4 @@
-"""SeparatingPlanes: a fast proof that a straight joint-space segment touches nothing."""
+"""SeparatingPlanes: a fast proof that straight joint-space segments touch nothing."""
 
 import math
 from typing import NamedTuple
@@ -39,16 +39,27 @@ class Tube(NamedTuple):
     """How far each joint may be off the segment (nv,) [rad or m]."""
 
 
+@compiled
 def configuration_tube(points: Array, step: Array) -> Tube:
     """Return a tube along a step (nv,) from the first of some points that holds them all.
 
     Being convex it holds the segments between the points (N, nv) [rad or m] as well.
     """
-    offset, square = points - points[0], float(step @ step)
-    share = np.clip(offset @ step / square, 0.0, 1.0) if square > 0.0 else np.zeros(len(points))
-    off = offset - np.outer(share, step)
-    low, high = off.min(axis=0), off.max(axis=0)
-    return Tube(points[0] + 0.5 * (low + high), step, 0.5 * (high - low))
+    square, nv = 0.0, step.size
+    low, high = np.zeros(nv), np.zeros(nv)
+    for j in range(nv):
+        square += step[j] * step[j]
+    for n in range(points.shape[0]):
+        along = 0.0
+        for j in range(nv):
+            along += (points[n, j] - points[0, j]) * step[j]
+        share = min(max(along / square, 0.0), 1.0) if square > 0.0 else 0.0
+        for j in range(nv):
+            off = points[n, j] - points[0, j] - share * step[j]
+            low[j], high[j] = min(low[j], off), max(high[j], off)
+    for j in range(nv):
+        low[j], high[j] = points[0, j] + 0.5 * (low[j] + high[j]), 0.5 * (high[j] - low[j])
+    return Tube(low, step, high)
 
 
 class SeparatingPlanes:
@@ -84,11 +95,9 @@ class SeparatingPlanes:
         corners = np.full((world.n_pairs, 4, 2), -1)
         corners[:, 0] = some_corner
         self._memory = _Memory(corners, np.flatnonzero(world.changes > 0))
-        nothing, rest = np.zeros(0, np.int64), np.zeros(world.arm.nv)
+        nothing, rest = np.zeros(0, np.int64), np.zeros((2, world.arm.nv))
         # Kernels are loaded, or compiled, here rather than where a plan's time is taken.
-        _segment_is_clear(
-            self._bodies, self._memory._replace(order=nothing), self._least, rest, rest
-        )
+        _polyline_is_clear(self._bodies, self._memory._replace(order=nothing), self._least, rest)
 
     def configuration_is_clear(self, q: Array) -> bool:
         """Return whether every distance at q (nq,) is proved above the margin."""
@@ -102,16 +111,29 @@ class SeparatingPlanes:
             q_b: the other end (nq,), reached the short way round on continuous joints.
         """
         arm = self._world.arm
-        return self._is_clear(arm.angles(q_a), arm.difference(q_a, q_b), self._least)
+        return self._is_clear(_ends(arm.angles(q_a), arm.difference(q_a, q_b)), self._least)
+
+    def polyline_is_clear(self, angles: Array) -> bool:
+        """Return whether every distance is proved above the margin on a whole polyline.
+
+        Args:
+            angles: joint positions that it goes through (N, nv) [rad or m], N >= 2; continuous
+                joints count their turns.
+        """
+        return self._is_clear(np.ascontiguousarray(angles), self._least)
 
     def tube_is_clear(self, tube: Tube) -> bool:
         """Return whether every distance is proved above the margin in all of a tube."""
         least = self._least + self._world.lipschitz @ tube.radius
-        return self._is_clear(tube.begin, tube.step, least)
+        return self._is_clear(_ends(tube.begin, tube.step), least)
 
-    def _is_clear(self, angles: Array, step: Array, least: Array) -> bool:
+    def _is_clear(self, angles: Array, least: Array) -> bool:
         self._world.require_version(self._version)
-        return bool(_segment_is_clear(self._bodies, self._memory, least, angles, step))
+        return bool(_polyline_is_clear(self._bodies, self._memory, least, angles))
+
+
+def _ends(begin: Array, step: Array) -> Array:
+    return np.array([begin, begin + step])
 
 
 class _Memory(NamedTuple):
@@ -124,20 +146,19 @@ class _Memory(NamedTuple):
 
 
 @compiled
-def _segment_is_clear(  # noqa: C901  # what is called at each level is compiled once more
-    bodies: Bodies, memory: _Memory, least: Array, angles: Array, step: Array
+def _polyline_is_clear(  # noqa: C901  # what is called at each level is compiled once more
+    bodies: Bodies, memory: _Memory, least: Array, points: Array
 ) -> bool:
-    """Prove all pairs on a segment, those first that were not clear lately.
+    """Prove all pairs on a polyline, on all of it those first that were not clear lately.
 
-    On each arc of the segment pairs are proved by faces of boxes, which are the cheapest planes,
+    On each arc of a segment pairs are proved by faces of boxes, which are the cheapest planes,
     then by planes that are looked for; what is left is tried again on both halves of the arc.
 
     Args:
         bodies: the bodies.
         memory: which pairs to prove, and what helps.
         least: distance that each pair must exceed (K,) [m].
-        angles: joint positions at one end (nv,) [rad or m].
-        step: from there to the other end (nv,) [rad or m].
+        points: joint positions that it goes through (N, nv) [rad or m].
     """
     n_joints, n_bodies = bodies.parent.size, bodies.joint.size
     pairs, shapes = bodies.pairs, bodies.shapes
@@ -145,10 +166,14 @@ def _segment_is_clear(  # noqa: C901  # what is called at each level is compiled
     joint_poses, poses = np.empty((3, n_joints, 12)), np.empty((3, n_bodies, 12))
     bounds, is_asked = np.empty((2, n_bodies, n_joints)), np.empty(n_bodies, np.bool_)
     # Of each pair a normal, and the gap that its plane leaves [m].
-    planes, work, longest = np.empty((least.size, 4)), np.empty((8, 4)), 0.0
-    for rate in step:
-        longest = max(longest, abs(rate))
-    for order in (memory.order[:_FIRST], memory.order[_FIRST:]):
+    planes, work, step = np.empty((least.size, 4)), np.empty((8, 4)), np.empty(points.shape[1])
+    n_segments, first = points.shape[0] - 1, memory.order[:_FIRST]
+    for part in range(2 * n_segments):
+        order = first if part < n_segments else memory.order[_FIRST:]
+        angles, longest = points[part % n_segments], 0.0
+        for j in range(step.size):
+            step[j] = points[part % n_segments + 1, j] - angles[j]
+            longest = max(longest, abs(step[j]))
         # Pairs, arcs on which they are not proved, and what is known of them there.
         waiting = np.empty((order.size, 3), np.int64)
         for n in range(order.size):

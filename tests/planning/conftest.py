@@ -79,6 +79,11 @@ class DiscWorld:
         # Where an end touches a disc, a rounding decides: no otherwise than for the end alone.
         return bool(np.all(gap > 0.0) and self.gap(q_a) > 0.0 and self.gap(q_b) > 0.0)
 
+    def polyline_is_clear(self, angles: Array) -> bool:
+        """Return whether every segment is clear."""
+        points = self.arm.configurations(angles)
+        return all(self.segment_is_clear(a, b) for a, b in pairwise(points))
+
 
 @pytest.fixture(scope="session")
 def make_arm() -> Callable[..., Arm]:

@@ -13,7 +13,7 @@ from densarm.planning.motion import PlanningError
 from densarm.planning.plan import plan_motion, plan_path
 from densarm.scenarios.run import run
 from densarm.scenarios.scenario import Scenario, load_scenario
-from densarm.scene.obstacles import Box, Obstacle
+from densarm.scene.obstacles import Box, Obstacle, Sphere
 from densarm.values.outcome import Outcome
 from densarm.world.swept_check import SweptCheck
 
@@ -94,6 +94,23 @@ def test_auto_asks_the_planner_where_the_density_is_stuck(
     with pytest.raises(PlanningError) as caught:
         plan_motion(*among(CELL, (0.0, 0.0), BEHIND), search=few)
     assert caught.value.outcome == Outcome.NO_PATH
+    assert "the density alone is stuck: " in caught.value.detail
+    assert "blocked by body_0 and" in caught.value.detail
+
+
+@pytest.mark.parametrize("vias", [0, 20])
+def test_a_critical_point_left_in_vain_is_told_whatever_leads(
+    vias: int, among: Among, cap: list[Obstacle]
+) -> None:
+    """The goal is exactly behind a ball, beside which the cap's arms are in the way."""
+    ball = Sphere(name="ball", radius=0.1, position=(0.0, 0.0, 0.0))
+    world, start, goal = among([ball, *cap], (-0.5, 0.0), INSIDE)
+    motion = plan_motion(world, start, goal, search=PlanningParameters(vias=vias))
+    assert motion.remark.startswith("left a critical point of the density at joint positions (0.23")
+    assert motion.path is not None
+    assert motion.path.stuck.endswith("blocked by body_0 and ball")
+    found_by = "the density by way of a via point" if vias else "RRT-Connect"
+    assert motion.path.found_by == found_by
 
 
 @pytest.mark.slow
@@ -103,3 +120,4 @@ def test_a_run_says_what_led_it() -> None:
     assert done.outcome == Outcome.REACHED
     assert done.led_by in {"the density alone", "RRT-Connect", "the straight segment"}
     assert (done.stuck == "") == (done.led_by == "the density alone")
+    assert run("swing_up", guide="auto").remark.startswith("left a critical point of the density")

@@ -4,6 +4,7 @@ import signal
 import subprocess
 import sys
 from collections.abc import Callable
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +21,7 @@ from densarm.planning.path_guide import PathGuide
 from densarm.scene.obstacles import Box, Sphere
 from densarm.scene.scene import Scene
 from densarm.values.arrays import Array
-from densarm.world.swept_check import SweptCheck
+from densarm.world.separating_planes import SeparatingPlanes
 from densarm.world.world import World
 
 Discs = Callable[..., Any]
@@ -145,6 +146,9 @@ class Watched:
     def segment_is_clear(self, q_a: Array, q_b: Array) -> bool:
         self._asked.append((q_a, q_b))
         return self._world.segment_is_clear(q_a, q_b)
+
+    def polyline_is_clear(self, angles: Array) -> bool:
+        return self._world.polyline_is_clear(angles)
 
     @property
     def ends(self) -> Array:
@@ -292,6 +296,10 @@ def test_an_interrupt_ends_the_plan_and_the_next_one_is_whole(
                 signal.raise_signal(signal.SIGINT)
             return bool(wall.segment_is_clear(q_a, q_b))
 
+        def polyline_is_clear(self, angles: Array) -> bool:
+            points = arm.configurations(angles)
+            return all(self.segment_is_clear(a, b) for a, b in pairwise(points))
+
     with pytest.raises(KeyboardInterrupt):
         PathGuide(arm, Interrupted()).plan(*ends(arm), 0)
     assert wall.segments == answers
@@ -364,9 +372,9 @@ def test_the_path_around_an_obstacle_is_clear_and_repeats(
     arm = load_arm(name)
     world = World(arm, scene)
     ends = arm.configuration(start), arm.configuration(goal)
-    path = path_of(PathGuide(arm, SweptCheck(world)).plan(*ends, seed=0))
+    path = path_of(PathGuide(arm, SeparatingPlanes(world)).plan(*ends, seed=0))
     assert len(path) > 2
     np.testing.assert_array_equal(path[[0, -1]], ends)
     assert min(world.distances(q).min() for q in samples_of(arm, path)) > 0.0
-    again = PathGuide(arm, SweptCheck(World(arm, scene))).plan(*ends, seed=0)
+    again = PathGuide(arm, SeparatingPlanes(World(arm, scene))).plan(*ends, seed=0)
     np.testing.assert_array_equal(path_of(again), path)

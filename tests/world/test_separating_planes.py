@@ -1,6 +1,7 @@
 """Segments proved by separating planes are those that the swept check proves by distances."""
 
 from collections.abc import Callable
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -72,6 +73,28 @@ def test_decides_as_the_swept_check_does(
             assert SweptCheck(world, MARGIN - 1e-4).segment_is_clear(q, q_to)
         else:
             assert not SweptCheck(world, BIT * MARGIN + 1e-3).segment_is_clear(q, q_to)
+
+
+@settings(max_examples=20)
+@given(seed=SEED, count=st.integers(2, 6))
+def test_a_polyline_is_clear_where_all_its_segments_are(
+    world: World,
+    used_planes: SeparatingPlanes,
+    within_limits: Callable[[Arm, Array], Array],
+    seed: int,
+    count: int,
+) -> None:
+    arm, rng = world.arm, np.random.default_rng(seed)
+    ends = within_limits(arm, rng.random((2, arm.nv)))
+    angles = ends[0] + np.linspace(0.0, 0.3, count)[:, np.newaxis] * (ends[1] - ends[0])
+    angles[1:-1] += rng.uniform(-0.01, 0.01, angles[1:-1].shape)
+    segments = list(pairwise(arm.configurations(angles)))
+    if used_planes.polyline_is_clear(angles):
+        looser = SweptCheck(world, MARGIN - 1e-4)
+        assert all(looser.segment_is_clear(*segment) for segment in segments)
+    else:
+        stricter = SweptCheck(world, BIT * MARGIN + 1e-3)
+        assert not all(stricter.segment_is_clear(*segment) for segment in segments)
 
 
 @settings(max_examples=40)
