@@ -53,7 +53,8 @@ class DensityTracking:
     [ZNV] has ∇ρ(e), singular at e = 0; this feedback tends to -K_p e there, and obstacles act at q,
     where they are. Where limits need it the attraction is scaled down, then all. Every sensing
     distance is below what the motion keeps from the unsafe set, so that Ψ = 1 on it and obstacles
-    act only on an arm that was pushed off it. The torque is taken to be held for the motion's
+    act only on an arm that was pushed off it; those that move, of which the motion knows nothing,
+    act from the largest sensing distance on. The torque is taken to be held for the motion's
     period: q̈_d is its mean over that time.
 
     `velocity` tracks it with a plant that is told velocities, which needs no masses:
@@ -226,7 +227,7 @@ def _sensed_off(
     joint_sensing = np.clip(sensing.path_share * inside, _SMALLEST, sensing.joint)
     pairs = ActivePairs(world, kinematics)
     return (
-        ClearanceSet(world, motion.margin, pair_sensing, pairs),
+        ClearanceSet(world, motion.margin, pair_sensing, pairs, sensing.distance),
         JointLimitSet(arm, joint_sensing),
     )
 

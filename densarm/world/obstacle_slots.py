@@ -47,6 +47,8 @@ class ChangingObstacles:
         """For each pair, the `version` that its obstacle came with, negative if spare (K,)."""
         self.obstacle_way: Array = np.zeros(len(pair_shapes))
         """How far a point of each pair's obstacle has moved at most since it came (K,) [m]."""
+        self.has_motion: NDArray[np.bool_] = np.zeros(len(pair_shapes), bool)
+        """Whether each pair's obstacle has a motion (K,)."""
         self.twist: Array = np.zeros((len(pair_shapes), 6))
         """Velocity of each pair's obstacle (K, 6): of its point at `Arm.origin` [m/s], and angular
         [rad/s], both in the world frame."""
@@ -65,6 +67,7 @@ class ChangingObstacles:
             ways, twists = self.obstacle_way[pairs], self.twist[pairs]
             slot = _Slot(self._shapes[begin:end], pairs, ways, twists)
             slot.hold(obstacle, self._origin)
+            self.has_motion[pairs] = obstacle.motion is not None
             self._present[obstacle.name] = slot
         self._moving: list[_Slot] | None = None
         self._scene: Scene | None = None
@@ -131,6 +134,7 @@ class ChangingObstacles:
         slot.told, self._scene = told, None
         if slot.obstacle.motion is not None:
             slot.obstacle, self._moving = slot.present(), None
+            self.has_motion[slot.pairs] = False
         self._put(slot, told, velocity, time)
 
     def set_time(self, time: float) -> None:
@@ -254,6 +258,7 @@ class ChangingObstacles:
 
     def _fill(self, slot: "_Slot", obstacle: Obstacle) -> None:
         slot.hold(obstacle, self._origin)
+        self.has_motion[slot.pairs] = obstacle.motion is not None
         self._note(slot, 1)
 
     def _put(self, slot: "_Slot", pose: Array, velocity: Array | None, time: float | None) -> None:
