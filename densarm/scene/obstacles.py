@@ -3,6 +3,7 @@
 import math
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, ClassVar
 
 import coal
@@ -70,7 +71,7 @@ class Obstacle(ABC):
         if self.motion is not None:
             self._begin(self.motion)
 
-    @property
+    @cached_property
     def reach(self) -> float:
         """Largest distance of a point of it from its frame's origin [m]."""
         ends = [extreme_points(shape) for shape in self.convex_shapes()]
@@ -241,7 +242,7 @@ class HalfSpace(Obstacle):
             raise InvalidValueError(f"{self.name}.offset", offset, "less than 1000 km away")
         self._store(normal=tuple(unit.tolist()), offset=offset)
 
-    @property
+    @cached_property
     def reach(self) -> float:
         """Infinite."""
         return math.inf

@@ -84,10 +84,17 @@ def least_distances(world: World, q: Array, limit: float) -> Array:
     return least
 
 
-def smallest_distances(world: World, q: Array) -> Array:
-    """Return the smallest distance of all pairs at configurations (N, nq), (N,) [m]."""
-    pairs = NearPairs(world)
-    return np.array([pairs.smallest(row)[0] for row in q])
+def smallest_distances(world: World, q: Array, time: Array | None = None) -> Array:
+    """Return the smallest distance of all pairs at configurations (N, nq), (N,) [m].
+
+    Obstacles with a motion are where it has them at times (N,) [s], or None for as they are.
+    """
+    pairs, smallest = NearPairs(world), np.empty(len(q))
+    for k, row in enumerate(q):
+        if time is not None:
+            world.set_time(float(time[k]))
+        smallest[k] = pairs.smallest(row)[0]
+    return smallest
 
 
 @compiled
