@@ -90,7 +90,9 @@ def swept_result(world: World, q: Array, v: Array, dt: float) -> SweptResult:
     acceleration = np.abs(np.diff(v, axis=0)) / dt
     k = np.arange(len(acceleration))
     around = np.max([acceleration[np.clip(k + by, 0, len(k) - 1)] for by in (-1, 0, 1)], axis=0)
-    return SweptCheck(world).check(q, around * dt**2 / 8.0, dt * np.arange(len(q)))
+    return SweptCheck(world).check(
+        q, around * dt**2 / 8.0, dt * np.arange(len(q), dtype=np.float64)
+    )
 
 
 def replay_errors(task: Task, q: Array, v: Array, tau: Array) -> Array:
@@ -220,7 +222,7 @@ def _stopping(task: Task, world: World, q: Array, v: Array) -> Check:
     arm, dt = task.arm, task.simulation.dt
     moves = world.fastest_obstacle > 0.0
     world.set_time(0.0)
-    time = dt * np.arange(len(q)) if moves else None
+    time = dt * np.arange(len(q), dtype=np.float64) if moves else None
     result = StoppingCheck(world, StoppingTrajectory(arm)).check(q, v, time)
     failing = result.failing
     if failing.size:

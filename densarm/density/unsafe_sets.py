@@ -133,7 +133,7 @@ class ClearanceSet:
         self.sensing_distance[:] = self._standing[:] = sensing_distance
         if self._moving is not None:
             is_moving = self._is_moving()
-            self._n_moving = np.count_nonzero(is_moving)
+            self._n_moving = int(np.count_nonzero(is_moving))
             self.sensing_distance[is_moving] = self._moving
         np.add(self.margin, self.sensing_distance, out=self.pairs.reach)
 
@@ -158,7 +158,7 @@ class ClearanceSet:
 
     def _is_moving(self) -> NDArray[np.bool_]:
         world = self.world
-        return (world.obstacle_way != self._way_before) | world.has_motion
+        return np.asarray((world.obstacle_way != self._way_before) | world.has_motion)
 
     def add_curvature(self, q: Array, theta: float, out: Array) -> None:  # noqa: ARG002
         """Act as `Curved.add_curvature`."""
