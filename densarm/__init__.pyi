@@ -44,7 +44,6 @@ from .scene.loading import load_scene as load_scene
 from .scene.mesh import Mesh as Mesh
 from .scene.motion import BackAndForth as BackAndForth
 from .scene.motion import ConstantVelocity as ConstantVelocity
-from .scene.motion import ObstacleMotion as ObstacleMotion
 from .scene.motion import Waypoints as Waypoints
 from .scene.obstacles import Box as Box
 from .scene.obstacles import Capsule as Capsule
