@@ -198,7 +198,7 @@ class Course:
             path=densarm.GuidePath(self.sub_goals.q[first:], self.path.is_clear),
             plain=plain,
             margin=scenario.control.margin,
-            gains=scenario.gains,
+            gains=scenario.law_gains,
             period=scenario.simulation.control_period,
             goal_distance=None if plain else densarm.TorusDistance(scenario.arm, kappa=kappa),
             density=scenario.density,

@@ -52,6 +52,8 @@ from .scene.obstacles import HalfSpace as HalfSpace
 from .scene.obstacles import Sphere as Sphere
 from .scene.scene import Attachment as Attachment
 from .scene.scene import Scene as Scene
+from .simulation.disturbances import Disturbances as Disturbances
+from .simulation.mujoco_plant import MujocoPlant as MujocoPlant
 from .simulation.plants import Plant as Plant
 from .simulation.plants import SingleIntegrator as SingleIntegrator
 from .simulation.run import Run as Run

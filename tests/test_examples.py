@@ -127,6 +127,7 @@ def test_reading_a_run(
 
 
 OWN_PARTS = ["own_controller", "own_guide", "own_goal_distance", "own_unsafe_set", "own_plant"]
+OWN_PARTS += ["own_mujoco_model"]
 SWING_UPS = ["swing_up", "three_link_swing_up"]
 
 
@@ -180,3 +181,15 @@ def test_own_plant(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixtur
     assert first.startswith("reached")
     assert float(first.split()[1]) > 0.004  # [rad], ten times what it is without friction
     assert last == "certified: False"
+
+
+@pytest.mark.slow
+def test_own_mujoco_model(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    run_example(monkeypatch, "own_mujoco_model.py")
+    out = capsys.readouterr().out
+    assert out.startswith("reached")
+    assert float(out.split()[1]) > 0.001  # [rad]
+    assert "swept     True" in out
+    assert "replay    None: does not apply" in out

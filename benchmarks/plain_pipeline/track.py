@@ -36,7 +36,7 @@ def plain_pipeline(scenario: Scenario) -> Drive:
     motion = _timed(scenario.arm, waypoints, period, scenario.timing)
     if motion is None:
         raise PlanningError(Outcome.NO_PATH, "TOPP-RA found no timing")
-    controller = ComputedTorque(scenario.arm, motion, scenario.gains)
+    controller = ComputedTorque(scenario.arm, motion, scenario.law_gains)
     return Drive(controller, motion=motion)
 
 

@@ -24,7 +24,7 @@ from densarm.arms.models import build_models, build_visual_model, end_effector_f
 from densarm.arms.self_collision import ExcludedPair, srdf_postures
 from densarm.errors import InvalidValueError, RobotDescriptionError
 from densarm.scene.scene import Attachment
-from densarm.values.arrays import Array
+from densarm.values.arrays import Array, Vector
 from densarm.values.checks import finite_vector
 from densarm.values.files import read_text
 
@@ -87,7 +87,7 @@ class Arm:
         """First index of each joint in a configuration, and 1 where it is continuous (2, nv)."""
         self._continuous: list[int] = np.flatnonzero(self.continuous).tolist()
         self.limits: JointLimits = joint_limits(
-            self.model, description.acceleration, has_masses=not self.links_without_mass
+            self.model, description, has_masses=not self.links_without_mass
         )
         self.end_effector_frame = end_effector_frame(self.model, description.end_effector)
         self.end_effector: str = self.model.frames[self.end_effector_frame].name
@@ -289,6 +289,9 @@ def load_arm(
     collision_from_visual: str | None = None,
     inertia: str | None = None,
     density: float | None = None,
+    acceleration: Vector | None = None,
+    torque_rate: Vector | float | None = None,
+    jerk: Vector | float | None = None,
 ) -> Arm:
     """Load an arm by name or from a URDF file.
 
@@ -321,12 +324,18 @@ def load_arm(
             unless a known robot needs another. An arm with `Arm.links_without_mass` is planned for
             and moved by velocities only.
         density: of masses from shapes [kg/m³]; None for 1000, or a known robot's own.
+        acceleration: limits of the arm's joints (nv,) [rad/s² or m/s²]; None for a known robot's
+            own, or 10 on every joint.
+        torque_rate: limits of the change of torque, but for gravity's, (nv,) or one for all joints
+            [N·m/s or N/s]; infinity for none; None for a known robot's own, or none.
+        jerk: limits as those (nv,) [rad/s³ or m/s³].
 
     Raises:
         UnknownNameError: no such robot, or joint to move, lock or cut at.
         InvalidValueError: a locked position or base placement that is not finite, a locked joint
             that shall be in the arm, shapes, links to collide as drawn or an inertia of another
-            name, or a density that is not positive or not read.
+            name, a density that is not positive or not read, or limits that are not positive or
+            of another length.
         FileContentError: a file that cannot be read.
         RobotDescriptionError: a URDF or SRDF that cannot be used.
     """
@@ -350,8 +359,12 @@ def load_arm(
     if cut := _listed(cut_joints):
         description = without_subtrees(description, cut)
     if joints is not None:
-        return Arm(only_joints(description, _listed(joints), locked_joints or {}))
-    return Arm(without_joints(description, locked_joints or {}))
+        description = only_joints(description, _listed(joints), locked_joints or {})
+    else:
+        description = without_joints(description, locked_joints or {})
+    limits = {"acceleration": acceleration, "torque_rate": torque_rate, "jerk": jerk}
+    changes = {key: value for key, value in limits.items() if value is not None}
+    return Arm(replace(description, **changes))
 
 
 def _listed(given: Any) -> list[Any]:

@@ -1,6 +1,7 @@
 """RobotDescription: everything that an arm is built from, as plain data."""
 
 import importlib.metadata
+import math
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
@@ -41,6 +42,11 @@ class RobotDescription:
     """Pose of the base in the world: x y z [m], quaternion x y z w."""
     acceleration: Vector | None = None
     """Acceleration limits (nv,) [rad/s² or m/s²]; None for the default on every joint."""
+    torque_rate: Vector | float | None = None
+    """Limits of the change of torque, but for gravity's, (nv,) or one for all [N·m/s or N/s]; None
+    for none, as infinity."""
+    jerk: Vector | float | None = None
+    """Jerk limits (nv,), or one for all [rad/s³ or m/s³]; None for none, as infinity."""
     end_effector: str | None = None
     """Frame whose path is drawn; None for the last link."""
     postures: Mapping[str, Vector] = field(default_factory=dict)
@@ -68,8 +74,11 @@ class RobotDescription:
             raise InvalidValueError("density", self.density, "with inertia = 'from_shapes' only")
         if self.density is not None:
             positive("density", self.density)
-        for key in ("package_dirs", "base_placement", "acceleration", "attachments"):
+        for key in ("package_dirs", "base_placement", *PER_JOINT, "attachments"):
             object.__setattr__(self, key, _frozen(getattr(self, key)))
+        for key in ("torque_rate", "jerk"):
+            if getattr(self, key) == math.inf:
+                object.__setattr__(self, key, None)
         postures = {name: _frozen(angles) for name, angles in self.postures.items()}
         object.__setattr__(self, "postures", postures)
 
@@ -95,6 +104,9 @@ class RobotDescription:
         except (TypeError, KeyError, AttributeError, ValueError) as error:
             raise DensarmError(f"robot description: {error}") from None
 
+
+PER_JOINT = ("acceleration", "torque_rate", "jerk")
+"""Fields that hold one number per joint."""
 
 _ALWAYS_RECORDED = ("postures", "package_dirs", "base_placement", "acceleration")
 

@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
-from densarm.arms.description import RobotDescription, parse_robot_xml
+from densarm.arms.description import PER_JOINT, RobotDescription, parse_robot_xml
 from densarm.arms.self_collision import PAIR_ENTRIES
 from densarm.arms.urdf import Urdf, end_link
 from densarm.errors import InvalidValueError, RobotDescriptionError, UnknownNameError
-from densarm.values.arrays import Array, Vector
+from densarm.values.arrays import Array
 from densarm.values.checks import finite_tuple, finite_vector, positive
 
 DEFAULT_ACCELERATION = 10.0
@@ -39,6 +39,11 @@ class JointLimits:
     """Acceleration limit [rad/s² or m/s²]."""
     effort: Array
     """Torque or force limit [N·m or N]; infinite as the velocity limit, and without masses."""
+    torque_rate: Array
+    """Limit of the change of torque, but for gravity's [N·m/s or N/s]; infinite where none is
+    declared, and without masses."""
+    jerk: Array
+    """Jerk limit [rad/s³ or m/s³]; infinite where none is declared."""
 
     def excess(self, angles: Array) -> Array:
         """Return how far joint positions (..., nv) are outside their limits [rad or m], or < 0."""
@@ -46,16 +51,13 @@ class JointLimits:
 
 
 def joint_limits(
-    model: pin.Model, acceleration: Vector | None, *, has_masses: bool = True
+    model: pin.Model, description: RobotDescription, *, has_masses: bool = True
 ) -> JointLimits:
-    """Return the limits of an arm's joints; None for the default acceleration on every joint.
+    """Return the limits of an arm's joints, of its model and its description.
 
     Without masses nothing tells what torque a motion takes, so that no torque is limited.
     """
-    if acceleration is None:
-        acceleration = (DEFAULT_ACCELERATION,) * model.nv
-    given = finite_vector("acceleration", acceleration, model.nv)
-    positive("acceleration", given.min())
+    acceleration, torque_rate, jerk = (_given_limit(model, description, key) for key in PER_JOINT)
     joints = list(model.joints)[1:]
     index = [joint.idx_q for joint in joints]
     lower, upper = model.lowerPositionLimit[index], model.upperPositionLimit[index]
@@ -64,9 +66,21 @@ def joint_limits(
         lower=np.where(continuous | (lower <= -_UNLIMITED), -np.inf, lower),
         upper=np.where(continuous | (upper >= _UNLIMITED), np.inf, upper),
         velocity=_limit_or_infinity(model.upperVelocityLimit),
-        acceleration=given,
+        acceleration=np.where(np.isinf(acceleration), DEFAULT_ACCELERATION, acceleration),
         effort=_limit_or_infinity(has_masses * model.upperEffortLimit),
+        torque_rate=torque_rate if has_masses else np.full(model.nv, np.inf),
+        jerk=jerk,
     )
+
+
+def _given_limit(model: pin.Model, description: RobotDescription, key: str) -> Array:
+    """Return a limit per joint (nv,), infinite where the description has none."""
+    value = getattr(description, key)
+    if value is None:
+        return np.full(model.nv, np.inf)
+    given = finite_vector(key, value if isinstance(value, tuple) else [value] * model.nv, model.nv)
+    positive(key, given.min())
+    return given
 
 
 def without_joints(description: RobotDescription, locked: Mapping[str, float]) -> RobotDescription:
@@ -219,11 +233,14 @@ def _of_joints(
     description: RobotDescription, before: list[str], kept: Collection[str], **changes: Any
 ) -> RobotDescription:
     """Return a description with changes, and what it gives per joint for the joints kept alone."""
-    index, given = [i for i, name in enumerate(before) if name in kept], description.acceleration
+    index = [i for i, name in enumerate(before) if name in kept]
     postures = description.postures.items()
+    limits = {key: getattr(description, key) for key in PER_JOINT}
+    for key, limit in limits.items():
+        if isinstance(limit, tuple):
+            changes[key] = [limit[i] for i in index]
     return replace(
         description,
-        acceleration=None if given is None else [given[i] for i in index],
         postures={name: [angles[i] for i in index] for name, angles in postures},
         **changes,
     )

@@ -8,6 +8,7 @@ import pinocchio as pin
 
 from densarm.arms.arm import Arm
 from densarm.certificates.task import (
+    PLANTS,
     REACHED_POSITION,
     REACHED_VELOCITY,
     Input,
@@ -25,6 +26,7 @@ REPLAY_TOLERANCE = 1e-9
 """Largest difference of a replayed state from the recorded one [rad, rad/s or m, m/s]."""
 
 _ROUNDING = 1e-9  # [rad, rad/s, N·m], room for rounding in comparisons with limits
+_OF_SENSORS = {"encoder_noise", "velocity_noise", "seed"}  # which leave the plant as it is
 _RESTS = 20  # ends of stopping trajectories at most whose distances are told
 
 
@@ -33,7 +35,8 @@ class Check:
     """One part of a certificate."""
 
     name: str
-    holds: bool
+    holds: bool | None
+    """None where it does not apply, so that nothing is claimed of it."""
     detail: str
     """What was found, in a phrase, with the margin's unit and place."""
     margin: float | None
@@ -47,15 +50,15 @@ class Check:
 @documented
 @dataclass(frozen=True)
 class Certificate:
-    """The parts of a certificate; the run is certified when all of them hold."""
+    """The parts of a certificate; the run is certified when all hold that apply."""
 
     checks: tuple[Check, ...]
     """One for each part."""
 
     @property
     def certified(self) -> bool:
-        """Whether every part holds."""
-        return all(check.holds for check in self.checks)
+        """Whether every part holds that applies."""
+        return all(check.holds is not False for check in self.checks)
 
 
 def certify(task: Task, time: Array, q: Array, v: Array, tau: Array) -> Certificate:
@@ -65,8 +68,9 @@ def certify(task: Task, time: Array, q: Array, v: Array, tau: Array) -> Certific
     goal, limits of position, velocity, acceleration and torque, one-step replay of the dynamics,
     and a clear stopping trajectory within the limits from every sample. Obstacles with a motion
     are where it has them at each time, between samples too; stopping is proved until the arm
-    is at rest, not that nothing runs into it afterwards. Torque limits do not apply
-    to commanded velocities, nor to an arm without masses, whose dynamics nothing can replay.
+    is at rest, not that nothing runs into it afterwards. Torque limits do not apply to commanded
+    velocities, nor to an arm without masses, whose dynamics nothing can replay; nor is a plant
+    replayed that is disturbed, or MuJoCo's.
     """
     world = World(task.arm, task.scene)
     return Certificate(
@@ -209,6 +213,11 @@ def _replay(task: Task, q: Array, v: Array, tau: Array) -> Check:
     if task.input == Input.TORQUE and task.arm.links_without_mass:
         lacking = ", ".join(task.arm.links_without_mass)
         return Check("replay", False, f"torque tells nothing: no mass of {lacking}", None, 0.0)
+    disturbed = sorted(set(task.disturbances) - _OF_SENSORS)
+    if task.plant != PLANTS[0] or disturbed:
+        by = f", disturbed by {', '.join(disturbed)}" if disturbed else ""
+        detail = f"does not apply: the record says that the plant is {task.plant}{by}"
+        return Check("replay", None, detail, None, 0.0)
     errors = np.append(replay_errors(task, q, v, tau), 0.0)
     worst = int(np.argmax(errors))
     error, at = float(errors[worst]), worst * task.simulation.dt
@@ -247,6 +256,8 @@ def _stopping(task: Task, world: World, q: Array, v: Array) -> Check:
         detail += "; until at rest, obstacles moving on"
     if arm.links_without_mass:
         detail += "; by acceleration limits alone"
+    elif set(task.disturbances) - _OF_SENSORS:
+        detail += "; by the torque of the arm's model, not of the disturbed plant"
     return Check("stopping", True, detail, _finite(rest.min()), at)
 
 

@@ -28,6 +28,9 @@ REACHED_POSITION = 0.01
 REACHED_VELOCITY = 0.01
 """Largest velocity of a joint at the goal [rad/s or m/s]."""
 
+PLANTS = ("pinocchio", "mujoco")
+"""Names of plants: the arm's model, or one of one's own; and what MuJoCo makes of an arm."""
+
 _LARGE = 10.0  # longest side of a mesh that is worth a remark [m]
 
 FORMAT = 2
@@ -96,7 +99,7 @@ class Task:
     """From a start to a goal among obstacles, and how time is stepped meanwhile.
 
     Raises:
-        InvalidValueError: start or goal is not a configuration.
+        InvalidValueError: start or goal is not a configuration, or a plant of no such name.
     """
 
     arm: Arm
@@ -116,10 +119,15 @@ class Task:
     simulation: SimulationParameters = field(default_factory=SimulationParameters)
     input: Input = Input.TORQUE
     """What the plant is told."""
+    plant: str = PLANTS[0]
+    """What is driven: one of `PLANTS`."""
+    disturbances: Mapping[str, Any] = field(default_factory=dict)
+    """How the plant differs from the model, `Disturbances.given`; empty where it does not."""
     settings: Mapping[str, Any] = field(default_factory=dict)
     """What else a scenario says, as JSON data: read by those who plan and control, kept here."""
 
     def __post_init__(self) -> None:
+        one_of("plant", self.plant, PLANTS)
         for key in ("start", "goal"):
             if getattr(self, key) is not None:
                 q = self.arm.check_configuration(f"{key} configuration", getattr(self, key))
@@ -156,6 +164,8 @@ class Task:
             "start": self.arm.angles(self.start).tolist(),
             "goal": goal,
             "input": str(self.input),
+            "plant": self.plant,
+            "disturbances": dict(self.disturbances),
             "control": control,
             **{key: asdict(getattr(self, key)) for key in _TABLES},
         }
@@ -183,6 +193,8 @@ class Task:
                 margin=float(control["margin"]),
                 kappa=float(control["kappa"]),
                 input=Input(data.get("input", Input.TORQUE)),
+                plant=str(data.get("plant", PLANTS[0])),
+                disturbances=dict(data.get("disturbances", {})),
                 settings={key: value for key, value in data.items() if key not in own},
                 **{key: parse_table(key, kind, data[key]) for key, kind in _TABLES.items()},
             )

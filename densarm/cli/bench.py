@@ -10,7 +10,14 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from densarm.cli.options import choice_option, number_option, output_option, together
+from densarm.cli.options import (
+    choice_option,
+    number_option,
+    output_option,
+    plant_options,
+    read_disturbances,
+    together,
+)
 from densarm.cli.output import print_table, progress, write_json
 from densarm.errors import FileContentError
 from densarm.values.outcome import Outcome
@@ -96,6 +103,15 @@ _set_options = together(
         is_flag=True,
         help="Compare each motion with the fastest along its path, by TOPP-RA.",
     ),
+    plant_options,
+    click.option(
+        "--draw",
+        multiple=True,
+        callback=read_disturbances,
+        metavar="NAME=SIZE",
+        help="Disturb each joint of each problem by an own number: mass_scale=0.1 from 0.9 to 1.1, "
+        "all others, as coulomb=0.5, from 0 to their size.",
+    ),
     number_option("--jobs", 1, "Processes."),
     click.option(
         "--save-dir",
@@ -160,6 +176,7 @@ def motionbenchmaker(problems: Path, every: int, **options: Any) -> None:
     \b
     Example:
       densarm bench motionbenchmaker --problems panda.json --every 10 --json results.json
+      densarm bench motionbenchmaker --problems panda.json --plant mujoco --draw mass_scale=0.1
     """  # noqa: D301
     with progress() as report:
         report("loading")
@@ -177,10 +194,18 @@ def _run_set(
     jobs: int,
     save_dir: Path | None,
     json: Path | None,
+    plant: str | None,
+    disturb: dict[str, Any],
+    draw: dict[str, float],
     **options: Any,
 ) -> Callable[[], None]:
     """Run problems and write what came of them; return what prints it."""
+    from densarm.simulation.disturbances import Disturbances
     from densarm.study.problems import run_problems
+    from densarm.values.tables import parse_table
+
+    parse_table("disturbances", Disturbances, {**disturb, **draw})  # refused before work is done
+    options |= {"plant": plant or "pinocchio", "disturb": disturb, "draw": draw}
 
     def run(guide: str, folder: Path | None) -> ProblemResults:
         try:

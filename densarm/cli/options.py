@@ -1,5 +1,6 @@
 """Options that commands share: numbers, and the files to write."""
 
+import json
 import os
 from collections.abc import Callable
 from functools import reduce
@@ -51,6 +52,42 @@ def output_option(
     kind = click.Path(path_type=Path)
     return click.option(name, type=kind, callback=check, metavar=metavar, help=help_text)
 
+
+def read_disturbances(
+    ctx: click.Context, param: click.Parameter, texts: tuple[str, ...]
+) -> dict[str, Any]:
+    """Return the keys of a table ``[disturbances]`` from texts NAME=VALUE, values as in JSON."""
+    told = {}
+    for text in texts:
+        name, equals, value = text.partition("=")
+        if not equals:
+            raise click.BadParameter(f"{text!r}: must be NAME=VALUE, as in payload=1", ctx, param)
+        try:
+            told[name] = json.loads(value)
+        except ValueError:
+            told[name] = value  # a name, or what its check refuses
+    return told
+
+
+plant_options = together(
+    click.option(
+        "--plant",
+        type=click.Choice(["pinocchio", "mujoco"]),
+        help="What is driven: the arm's model, or the same in MuJoCo (pip install "
+        "'densarm[mujoco]').  [default: what the scenario says, else pinocchio]",
+    ),
+    click.option(
+        "--disturb",
+        "disturb",
+        multiple=True,
+        callback=read_disturbances,
+        metavar="NAME=VALUE",
+        help="How the plant differs from its model, which no controller is told: mass_scale, "
+        "payload, viscous, coulomb, armature, torque_delay, torque_quantum, encoder_noise, "
+        "velocity_noise, base_tilt_deg and more, in SI units; lists in brackets. May be repeated.",
+    ),
+)
+"""Adds --plant and --disturb, a name or None and the keys of a table [disturbances]."""
 
 PLOT_ENDINGS = (".png", ".pdf", ".svg")
 

@@ -121,6 +121,9 @@ def print_run(run: Run, compiled: float) -> None:
         "planned again": ", ".join(f"at t = {time:.3f} s" for time in run.replanned_at),
         "robot": "; ".join(run.task.arm.remarks),
     }
+    if run.task.plant != "pinocchio" or run.task.disturbances:
+        told = ", ".join(f"{name} {value}" for name, value in run.task.disturbances.items())
+        figures["plant"] = f"{run.task.plant}, {told or 'undisturbed'}"
     if run.tracking_error is not None:
         figures["tracking error"] = f"{run.tracking_error:.2g} rad"
     if run.base_overlaps:
@@ -155,5 +158,7 @@ def print_records(energy: EnergyRecord, rantzer: RantzerRecord) -> None:
     click.echo(f"  {'Rantzer':<{_COLUMN - 2}}{found}")
 
 
-def _verdict(holds: bool) -> str:
+def _verdict(holds: bool | None) -> str:
+    if holds is None:
+        return "–  "
     return click.style("yes", fg="green") if holds else click.style("no ", fg="red")

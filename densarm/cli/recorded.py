@@ -50,8 +50,9 @@ def verify(run: str, json: Path | None) -> bool:
     The checks: the swept volume of the whole motion touches neither obstacles nor the arm itself
     (swept), it begins at the start and ends at rest at the goal (start, goal), inside all limits
     (limits), each recorded torque leads from each state to the next (replay), and from every state
-    the arm can stop along a straight line, inside the limits and in free space (stopping). The exit
-    status is 0 if all of them hold.
+    the arm can stop along a straight line, inside the limits and in free space (stopping). Replay
+    does not apply to a plant that the record says is disturbed, or MuJoCo's. The exit status is 0
+    if all hold that apply.
 
     Recorded beside them, at some of the samples, and never a reason to refuse: whether the energy
     of an unlimited regulation fell, and where Rantzer's condition held.

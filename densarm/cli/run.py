@@ -1,11 +1,12 @@
 """``densarm run``: plan and simulate a scenario."""
 
 from pathlib import Path
+from typing import Any
 
 import click
 
 from densarm.cli.first_run import compiling_meanwhile
-from densarm.cli.options import number_option, output_option, picture_options
+from densarm.cli.options import number_option, output_option, picture_options, plant_options
 from densarm.cli.output import print_run, progress, write_json, write_pictures
 
 
@@ -20,6 +21,8 @@ from densarm.cli.output import print_run, progress, write_json, write_pictures
 @number_option(
     "--seed", None, "Seed of the planner.  [default: what the scenario says, else 0]", least=0
 )
+@plant_options
+@click.option("--viewer", is_flag=True, help="Show it in MuJoCo's viewer while it runs.")
 @output_option("--save", "RUN.npz", "Write the recorded run.")
 @picture_options
 @output_option("--json", "FILE", "Write the summary as JSON.")
@@ -27,6 +30,9 @@ def run(
     scenario: str,
     guide: str | None,
     seed: int | None,
+    plant: str | None,
+    disturb: dict[str, Any],
+    viewer: bool,
     save: Path | None,
     json: Path | None,
     **pictures: Path | None,
@@ -40,6 +46,7 @@ def run(
     Examples:
       densarm run swing_up --html swing_up.html
       densarm run panda_shelf --png panda_shelf.png --gif panda_shelf.gif
+      densarm run panda_table --plant mujoco --disturb payload=1 --disturb coulomb=0.5
       densarm run my_scenario.toml --guide direct --save run.npz --json run.json
     """  # noqa: D301
     with progress() as show:
@@ -47,8 +54,11 @@ def run(
         show(doing)
         from densarm.scenarios.run import run as run_scenario
         from densarm.scenarios.scenario import load_scenario
+        from densarm.simulation.disturbances import Disturbances
+        from densarm.simulation.mujoco_plant import MujocoPlant
         from densarm.values.kernels import on_compiling
         from densarm.values.outcome import Outcome
+        from densarm.values.tables import parse_table
 
         def report(phrase: str) -> None:
             nonlocal doing
@@ -59,7 +69,15 @@ def run(
             show("compiling, once on this machine" if begins else doing)
 
         with on_compiling(compiling) as compiled, compiling_meanwhile():
-            done = run_scenario(load_scenario(scenario), guide, seed, on_progress=report)
+            chosen = load_scenario(scenario)
+            told = parse_table(
+                "disturbances", Disturbances, {**chosen.disturbances.given, **disturb}
+            )
+            driven: MujocoPlant | str | None = plant
+            if viewer:
+                driven = MujocoPlant(chosen.world, chosen.simulation.dt, told)
+                driven.view()
+            done = run_scenario(chosen, guide, seed, report, plant=driven, disturbances=told)
             report("proving")
             certificate = done.certificate
             report("writing")

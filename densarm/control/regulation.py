@@ -8,6 +8,7 @@ from numpy.typing import ArrayLike
 
 from densarm.arms.arm import Arm
 from densarm.control.controller import Gains, checked_state
+from densarm.control.disturbance_observer import ActuationParameters
 from densarm.control.inverse_dynamics import InverseDynamics
 from densarm.control.speed_law import SpeedLaw, SpeedParameters
 from densarm.control.stopping import BackupFilter
@@ -49,10 +50,11 @@ class VelocityField(Protocol):
 class FieldRegulation:
     r"""Regulate to the goal along a velocity field, without a reference in time.
 
-    .. math:: \tau = H + M K_v (k(q) - \dot q)
+    .. math:: \tau = H + M K_v (k(q) - \dot q) - \hat d
 
     With the field of the density, k = (K_p/K_v) ∇ρ at the speed of the speed law, this is [ZNV]
-    eq. 17 with a constant q_d, its attraction scaled before its damping. Where the arm could no
+    eq. 17 with a constant q_d, its attraction scaled before its damping. d̂ is added to it: what the
+    model does not explain, by a `DisturbanceObserver`. Where the arm could no
     longer stop in the free space ahead, it stops along a straight line. With `inertia_at`, a
     configuration (nq,) whose largest inertia is the unit of the metric M, gradients are taken in
     that, so that the torque itself points along them.
@@ -68,6 +70,7 @@ class FieldRegulation:
         gains: Gains = Gains(),
         period: float = 0.001,
         inertia_at: Array | None = None,
+        actuation: ActuationParameters = ActuationParameters(),
     ) -> None:
         self._arm = arm
         self._field = field
@@ -79,7 +82,8 @@ class FieldRegulation:
         checked_state(arm, arm.configuration(np.zeros(arm.nv)), np.zeros(arm.nv))  # loads a kernel
         if arm.links_without_mass:
             return
-        self._dynamics = InverseDynamics(arm, HELD_SHARE * arm.limits.acceleration)
+        limit = HELD_SHARE * arm.limits.acceleration
+        self._dynamics = InverseDynamics(arm, limit, None, period, actuation)
         self._filter = BackupFilter(arm, speed_law, gains, period)
         self._dynamics.load()
 
@@ -91,7 +95,8 @@ class FieldRegulation:
         """
         self._arm.require_masses("torque")
         q, v = checked_state(self._arm, q, v)
-        self._dynamics.update(q, v)
+        self._dynamics.update(t, q, v)
+        v = self._dynamics.velocity
         metric = self._scale * self._dynamics.mass_matrix() if self._scale > 0.0 else None
         wanted = self._dynamics.torque(-self._gain * v, self._gain * self._limited(q, metric))
         return self._filter.torque(t, self._dynamics, q, v, wanted, self._field.distances)
@@ -108,7 +113,9 @@ class FieldRegulation:
 class DensityRegulation(FieldRegulation):
     r"""Regulate to a goal by the density, obstacles acting wherever the arm is.
 
-    .. math:: \tau = H + M K_v (k(q) - \dot q), \qquad k(q) = \min\{1, s / \|p\|\} \, p, \qquad
+    .. math::
+
+        \tau = H + M K_v (k(q) - \dot q) - \hat d, \qquad k(q) = \min\{1, s / \|p\|\} \, p, \qquad
         p = \frac{K_p}{K_v} \frac{\ell}{\|q \ominus q_{sub}\|} \, \nabla\rho(q)
 
     s is the speed law. A sub-goal q_sub pulls as from the end of the way ℓ that is left to the
@@ -135,6 +142,7 @@ class DensityRegulation(FieldRegulation):
         density: α, θ, gauge and blend, and the weights of a `TorusDistance`.
         sensing: sensing distances.
         speed: parameters of the speed law.
+        actuation: how late torque is, and how far the model is trusted.
 
     Attributes:
         goal: as given (nq,).
@@ -161,6 +169,7 @@ class DensityRegulation(FieldRegulation):
         density: DensityParameters = DensityParameters(),
         sensing: SensingParameters = SensingParameters(),
         speed: SpeedParameters = SpeedParameters(),
+        actuation: ActuationParameters = ActuationParameters(),
     ) -> None:
         require_smooth_goal(density, may_blend=True)
         arm = world.arm
@@ -176,7 +185,7 @@ class DensityRegulation(FieldRegulation):
         self._density_field = _DensityField(self._guided, gains.rate)
         inertia_at = path.waypoints[-1] if plain else None
         law = SpeedLaw(world, margin, speed)
-        super().__init__(arm, self._density_field, law, gains, period, inertia_at)
+        super().__init__(arm, self._density_field, law, gains, period, inertia_at, actuation)
 
     def set_goal(self, goal: ArrayLike) -> None:
         """Lead to another goal from the next call on, without sub-goals.

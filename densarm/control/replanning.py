@@ -63,6 +63,11 @@ class Replanning:
         """As `Supervisor.tracking_error`, of the controller along the plan."""
         return self._supervisor.tracking_error
 
+    @property
+    def is_moving(self) -> bool | None:
+        """As `Supervisor.is_moving`."""
+        return self._supervisor.is_moving
+
     def describe_stall(self, q: Array) -> str:
         """Return why the arm rests at q (nq,), as a phrase."""
         describe = getattr(self._supervisor.controller, "describe_stall", lambda _: "")
@@ -91,8 +96,10 @@ class Replanning:
             self.replanned_at += (t,)
 
     def _has_lost(self, t: float, q: Array) -> bool:
-        motion = self._supervisor.motion
-        if motion is not None and t - self._began <= motion.duration:
+        motion, moves = self._supervisor.motion, self._supervisor.is_moving
+        if moves is None:
+            moves = motion is not None and t - self._began <= motion.duration
+        if moves:
             return (self._supervisor.tracking_error or 0.0) > _LOST
         if self._stood is None or self._error(self._stood[1], q) > _STANDING:
             self._stood = t, q.copy()

@@ -7,6 +7,7 @@ import pinocchio as pin
 
 from densarm.arms.arm import Arm
 from densarm.control.controller import Gains
+from densarm.control.disturbance_observer import ActuationParameters
 from densarm.control.inverse_dynamics import InverseDynamics
 from densarm.control.speed_law import SpeedLaw
 from densarm.values.arrays import Array
@@ -22,20 +23,30 @@ class StopAndHold:
 
     .. math::
 
-        \tau = H - M \dot q / (T - t), \qquad
-        \tau = H - M \big( K_p (q \ominus q_{rest}) + K_v \dot q \big),
+        \tau = H - M \dot q / (T - t) - \hat d, \qquad
+        \tau = H - M \big( K_p (q \ominus q_{rest}) + K_v \dot q \big) - \hat d,
 
     t the time since it began and T as in `StoppingTrajectory`; torques and accelerations are
-    within the limits. Where gravity asks for more torque than there is, the arm cannot be held.
-    The period is the time between two calls [s].
+    within the limits, and the torque's rate too once the arm holds. d̂ is what the model does not
+    explain, by a `DisturbanceObserver`, so that the arm does not sag under a load that is not told.
+    Where gravity asks for more torque than there is, the arm cannot be held. The period is the time
+    between two calls [s].
     """
 
-    def __init__(self, arm: Arm, gains: Gains, period: float) -> None:
+    def __init__(
+        self,
+        arm: Arm,
+        gains: Gains,
+        period: float,
+        actuation: ActuationParameters = ActuationParameters(),
+    ) -> None:
         self._arm = arm
         self._gains = gains
         self._period = self._shortest = period
-        self._dynamics = InverseDynamics(arm, _ACCELERATION_SHARE * arm.limits.acceleration)
+        limit = _ACCELERATION_SHARE * arm.limits.acceleration
+        self._dynamics = InverseDynamics(arm, limit, None, period, actuation)
         self._dynamics.load()
+        self._time = 0.0
         self._stopping = StoppingTrajectory(arm, _ACCELERATION_SHARE)
         self._time_left = math.nan
         self._rest: Array | None = None
@@ -56,14 +67,16 @@ class StopAndHold:
 
     def torque(self, q: Array, v: Array, dt: float) -> Array:
         """Return the torque (nv,) [N·m or N] at q (nq,) and v (nv,), dt [s] after the last call."""
-        self._dynamics.update(q, v)
-        self._time_left -= dt
+        self._time, self._time_left = self._time + dt, self._time_left - dt
+        self._dynamics.update(self._time, q, v)
         if self._rest is None and np.abs(v).max() <= _REST:
             self._rest = q.copy()
         if self._rest is not None:
             error = self._arm.difference(self._rest, q)
-            return self._dynamics.torque(-self._gains.velocity * v, -self._gains.position * error)
-        return self._dynamics.brake_torque(v, self._time_left, self._shortest)
+            brake, attract = -self._gains.velocity * v, -self._gains.position * error
+            return self._dynamics.send(self._dynamics.torque(brake, attract))
+        tau = self._dynamics.brake_torque(v, self._time_left, self._shortest)
+        return self._dynamics.send(tau, is_emergency=True)
 
 
 class BackupFilter:
@@ -105,27 +118,30 @@ class BackupFilter:
         wanted: Array,
         distances: DistanceBounds,
     ) -> Array:
-        """Return the wanted torque (nv,) [N·m or N] as far as the jerk allows, or that to stop.
+        """Send the wanted torque (nv,) [N·m or N] as far as the jerk allows, or that to stop.
 
         The dynamics are updated at q (nq,) and v (nv,), where the distances of all pairs are these.
         """
         if not abs(t - self._time) <= 1.5 * self._period:
             self._last = np.zeros_like(wanted)
         self._time = t
-        a, tau = self._acceleration(q, v, wanted), wanted
+        unknown = dynamics.disturbance
+        a, tau = self._acceleration(q, v, wanted + unknown), wanted
         change = a - self._last
         excess = float((np.abs(change) / self._step).max())
         if not excess <= 1.0:
             limit = self._arm.limits.effort
             tau = pin.rnea(self._arm.model, self._data, q, v, self._last + change / excess)
-            tau = np.asarray(np.clip(tau, -limit, limit))
-            a = self._acceleration(q, v, tau)
+            tau = np.asarray(np.clip(tau - unknown, -limit, limit))
+        tau = dynamics.send(tau)
+        a = self._acceleration(q, v, tau + unknown)
         v_next = v + self._period * a
         motion = self._period * np.maximum(np.abs(v), np.abs(v_next))
         q_next = self._arm.integrate(q, self._period * v_next)
         if not self._speed_law.can_stop(q_next, v_next, distances, motion):
             tau = dynamics.brake_torque(v, self._stopping.duration(q, v), self._period)
-            a = self._acceleration(q, v, tau)
+            tau = dynamics.send(tau, is_emergency=True)
+            a = self._acceleration(q, v, tau + unknown)
         self._last = a
         return tau
 

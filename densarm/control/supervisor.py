@@ -156,6 +156,11 @@ class Supervisor:
         return getattr(self.controller, "motion", None)
 
     @property
+    def is_moving(self) -> bool | None:
+        """Whether the controller's reference still moves; None where it does not tell."""
+        return getattr(self.controller, "is_moving", None)
+
+    @property
     def tracking_error(self) -> float | None:
         """How far off the controller's reference the arm is [rad or m]; None if it has none.
 

@@ -2,19 +2,27 @@
 
 import math
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from densarm.arms.dynamics import Kinematics
 from densarm.control.controller import Gains, checked_state
+from densarm.control.disturbance_observer import (
+    AHEAD_ANGLE,
+    AHEAD_VELOCITY,
+    DISTURBANCE,
+    ActuationParameters,
+)
 from densarm.control.inverse_dynamics import (
     ATTRACT,
     BRAKE,
+    EFFORT_LIMIT,
     TORQUE,
+    VELOCITY_LIMIT,
     InverseDynamics,
-    limited_torque,
+    robust_torque,
+    send,
 )
 from densarm.density.goal_distance import GoalDistance, TorusDistance, torus_distance
 from densarm.density.navigation_density import (
@@ -30,13 +38,16 @@ from densarm.density.unsafe_sets import (
     UnsafeSet,
 )
 from densarm.errors import InvalidValueError
-from densarm.planning.motion import Motion, write_sample
+from densarm.planning.motion import Motion, MotionSample, write_sample
 from densarm.values.arrays import Array
 from densarm.values.kernels import compiled
 from densarm.world.active_pairs import ActivePairs
 from densarm.world.near_pairs import least_distances
 from densarm.world.stopping import HELD_SHARE
 from densarm.world.world import DISTANCE_TOLERANCE, World
+
+TRACKING_GAINS = Gains(position=1600.0, velocity=80.0)
+"""Of tracking, whose feedback no cap on accelerations weakens."""
 
 _INTERVAL = 0.02  # [s] of the motion between computed distances
 _SMALLEST = 1e-6  # [m or rad], sensing distance where the motion leaves no distance to sense in
@@ -47,15 +58,28 @@ class DensityTracking:
 
     .. math::
 
-        \tau = H + M \big( \ddot q_d + K_p \nabla(-1/\rho) - K_v \dot e \big), \qquad
-        e = q \ominus q_d, \quad \rho = \Psi(q) / V(e)
+        \tau = H + M \ddot q_d + (M + D)\, \varphi\big( K_p \nabla(-1/\rho) - K_v \dot e \big)
+        - \hat d, \qquad e = q \ominus q_d, \quad \rho = \Psi(q) / V(e)
 
     [ZNV] has ∇ρ(e), singular at e = 0; this feedback tends to -K_p e there, and obstacles act at q,
-    where they are. Where limits need it the attraction is scaled down, then all. Every sensing
-    distance is below what the motion keeps from the unsafe set, so that Ψ = 1 on it and obstacles
-    act only on an arm that was pushed off it; those that move, of which the motion knows nothing,
-    act from the largest sensing distance on. The torque is taken to be held for the motion's
-    period: q̈_d is its mean over that time.
+    where they are. It is added for an arm that is not its model: D and d̂ (`ActuationParameters`),
+    φ, which asks for no more than the torque rate can follow, and each joint saturates by itself.
+    The attraction is at most K_v times the velocity limit, so that no push is answered by a return
+    faster than that. Every sensing distance is below what the motion keeps from the unsafe set, so
+    that Ψ = 1 on it and obstacles act only on an arm that was pushed off it; those that move, of
+    which the motion knows nothing, act from the largest sensing distance on. The torque is taken to
+    be held for the motion's period: q̈_d is its mean over that time. State and reference are those
+    of the time when it acts.
+
+    The reference waits for an arm that is held up: its time σ runs by
+
+    .. math::
+
+        \dddot\sigma = \omega^2 (r - \dot\sigma) - 2 \omega \ddot\sigma, \quad
+        r = \frac{1}{1 + (|e| / \epsilon)^2} \sqrt{\min_i \Big( 1 - \frac{|\hat d_i|}
+        {\tau^{max}_i - |H_i|} \Big)}
+
+    both beyond a dead zone: unknown torque leaves less for accelerations, which go with σ̇².
 
     `velocity` tracks it with a plant that is told velocities, which needs no masses:
 
@@ -73,6 +97,7 @@ class DensityTracking:
         unsafe_sets: what else must not be entered, beside pairs of bodies and joint limits.
         density: α, θ and gauge; tracking lives at e = 0, where nothing may be singular or flat.
         sensing: largest sensing distances, and their share of the distance kept on the way.
+        actuation: how late torque is, and how far the model is trusted.
 
     Attributes:
         motion: as given.
@@ -90,11 +115,12 @@ class DensityTracking:
         world: World,
         motion: Motion,
         *,
-        gains: Gains = Gains(),
+        gains: Gains = TRACKING_GAINS,
         goal_distance: GoalDistance | None = None,
         unsafe_sets: Sequence[UnsafeSet] = (),
         density: DensityParameters = DensityParameters(),
         sensing: SensingParameters = SensingParameters(),
+        actuation: ActuationParameters = ActuationParameters(),
     ) -> None:
         require_smooth_goal(density, may_blend=False)
         arm = world.arm
@@ -107,26 +133,19 @@ class DensityTracking:
         unsafe = [*_sensed_off(world, motion, sensing, self._kinematics), *unsafe_sets]
         self._density = NavigationDensity(arm, self.goal, unsafe, distance, density)
         self._gains = gains
-        self._arrays: tuple[Any, ...] | None = None
         if arm.links_without_mass:
             self.velocity(0.0, self.goal, np.zeros(arm.nv))
             return
-        limit = HELD_SHARE * arm.limits.acceleration
-        self._dynamics = InverseDynamics(arm, limit, self._kinematics)
-        if isinstance(distance, TorusDistance):  # V by one kernel with all the rest, for its speed
-            numbers = 0.0, 0.0, motion.period, distance.kappa, gains.position, gains.velocity
-            sample = np.zeros((5, arm.nv))
-            sample[_WEIGHTS] = distance.weights
-            self._arrays = (
-                np.array(numbers),
-                self._dynamics.rows,
-                sample,
-                motion.knots,
-                arm.joint_index,
-                self._density.log_psi_gradient,
-                *self._dynamics.terms,
-            )
-        self.torque(0.0, self.goal, np.zeros(arm.nv))  # kernels are loaded before a control loop
+        unlimited = np.full(arm.nv, math.inf)
+        self._dynamics = InverseDynamics(arm, unlimited, self._kinematics, motion.period, actuation)
+        self._numbers = np.zeros(_N_NUMBERS)
+        kappa = distance.kappa if isinstance(distance, TorusDistance) else math.nan
+        constants = motion.period, actuation.delay, kappa, gains.position, gains.velocity
+        self._numbers[_PERIOD:] = constants
+        self._sample = np.zeros((5, arm.nv))
+        self._sample[_WEIGHTS] = getattr(distance, "weights", 1.0)
+        for t in (0.0, motion.period, math.nan):  # kernels are loaded before a control loop
+            self.torque(t, self.goal, np.zeros(arm.nv))
         self.tracking_error = 0.0
 
     def torque(self, t: float, q: ArrayLike, v: ArrayLike) -> Array:
@@ -138,14 +157,34 @@ class DensityTracking:
         self._arm.require_masses("torque")
         q, v = checked_state(self._arm, q, v)
         self._kinematics.update(q)
-        if self._arrays is None:
-            return self._torque_by_any_distance(t, q, v)
-        numbers, rows = self._arrays[:2]
-        self._density.update_psi(q)
-        self._dynamics.update(q, v)
-        numbers[0], numbers[1] = t, self._density.log_psi
-        self.tracking_error = _tracking_torque(q, v, *self._arrays)
-        return np.array(rows[TORQUE])
+        numbers, dynamics = self._numbers, self._dynamics
+        begins, elapsed = dynamics.begins(t), dynamics.update(t, q, v)
+        if begins:
+            numbers[_LAG : _CHANGE + 1] = 0.0, 1.0, 0.0
+        else:
+            numbers[_LAG] += (1.0 - numbers[_RATE]) * elapsed
+        numbers[_TIME], numbers[_ELAPSED] = t - numbers[_LAG], elapsed
+        if math.isnan(numbers[_KAPPA]):
+            dynamics.rows[ATTRACT] = self._attraction(q, self._ahead().position)
+        else:
+            self._density.update_psi(q)
+        numbers[_LOG_PSI] = self._density.log_psi
+        self.tracking_error = _tracking_torque(
+            numbers,
+            dynamics.rows,
+            self._sample,
+            self.motion.knots,
+            self._arm.joint_index,
+            self._density.log_psi_gradient,
+            *dynamics.terms,
+            dynamics.sent,
+        )
+        return np.array(dynamics.rows[TORQUE])
+
+    @property
+    def is_moving(self) -> bool:
+        """Whether the reference still moves, which waits where the arm is held up."""
+        return bool(self._numbers[_TIME] < self.motion.duration)
 
     def velocity(self, t: float, q: ArrayLike, v: ArrayLike) -> Array:
         """Act as `VelocityController.velocity`, v being the velocity commanded last."""
@@ -168,13 +207,10 @@ class DensityTracking:
         """As `Motion.remark`."""
         return self.motion.remark
 
-    def _torque_by_any_distance(self, t: float, q: Array, v: Array) -> Array:
-        motion, gains = self.motion, self._gains
-        point = motion.sample(t, lead=0.5 * motion.period)
-        attract = self._attraction(q, point.position)
-        self._dynamics.update(q, v)
-        brake = point.acceleration - gains.velocity * (v - point.velocity)
-        return self._dynamics.torque(brake, gains.position * attract)
+    def _ahead(self) -> MotionSample:
+        """Return the reference when a torque sent now acts."""
+        numbers = self._numbers
+        return self.motion.sample(numbers[_TIME] + numbers[_DELAY] * numbers[_RATE])
 
     def _attraction(self, q: Array, wanted: Array) -> Array:
         """Return ∇ρ (nv,) at q (nq,) towards joint positions (nv,), and keep the error."""
@@ -234,11 +270,19 @@ def _sensed_off(
 
 _POSITION, _VELOCITY, _ACCELERATION, _ERROR, _WEIGHTS = 0, 1, 2, 3, 4  # rows of a sample
 
+# Numbers of the kernel: the reference's time σ, how far it is behind, and its derivatives.
+_TIME, _LAG, _RATE, _CHANGE, _ELAPSED, _LOG_PSI = 0, 1, 2, 3, 4, 5
+_PERIOD, _DELAY, _KAPPA, _POSITION_GAIN, _VELOCITY_GAIN, _N_NUMBERS = 6, 7, 8, 9, 10, 11
+
+_CLOCK_RATE = 20.0  # ω [1/s]
+_WAITING_ERROR, _FREE_ERROR = 0.03, 0.005  # ε, and what the reference does not wait for [rad or m]
+_FREE_LOAD = 0.05  # of the torque left, which unknown torque may take without slowing the reference
+_LEAST_SHARE = 0.1  # of torque that counts as left
+_LARGEST_GAIN = 0.4  # of K_v times the time that a torque is late
+
 
 @compiled
 def _tracking_torque(
-    q: Array,
-    v: Array,
     numbers: Array,
     rows: Array,
     sample: Array,
@@ -247,28 +291,44 @@ def _tracking_torque(
     log_psi_gradient: Array,
     mass: Array,
     nonlinear: Array,
+    gravity: Array,
+    sent: Array,
 ) -> float:
-    """Write the torque of `DensityTracking` as `limited_torque` does; return the tracking error.
+    """Write and send the torque of `DensityTracking`; return the tracking error.
 
     It is one kernel, of few arguments, since every call and every argument has its cost.
     """
-    u, log_psi = numbers[0] / numbers[2], numbers[1]
-    write_sample(u, u + 0.5, numbers[2], knots, sample)
-    error, attract, largest = sample[_ERROR], rows[ATTRACT], 0.0
-    for i in range(v.shape[0]):
-        k, wanted = joint_index[0, i], sample[_POSITION, i]
-        off = q[k] - wanted
+    period, elapsed, rate = numbers[_PERIOD], numbers[_ELAPSED], numbers[_RATE]
+    late = elapsed + numbers[_DELAY]
+    u = (numbers[_TIME] + rate * numbers[_DELAY]) / period
+    write_sample(u, u + 0.5 * rate * elapsed / period, period, knots, sample)
+    error, attract, largest, left, n = sample[_ERROR], rows[ATTRACT], 0.0, 1.0, nonlinear.size
+    for i in range(n):
+        off = rows[AHEAD_ANGLE, i] - sample[_POSITION, i]
         if joint_index[1, i]:
-            c, s = math.cos(wanted), math.sin(wanted)
-            off = math.atan2(q[k + 1] * c - q[k] * s, q[k] * c + q[k + 1] * s)
-        if abs(off) > largest:
-            largest = abs(off)
-        error[i] = off
-        rows[BRAKE, i] = sample[_ACCELERATION, i] - numbers[5] * (v[i] - sample[_VELOCITY, i])
-    distance = torus_distance(error, joint_index, sample[_WEIGHTS], numbers[3])
-    # In the reciprocal gauge with α = 1, as `require_smooth_goal` has it.
-    write_gauge_gradient(log_psi_gradient, distance, error, 1.0, log_psi, 0.0, -1.0, attract)
-    for i in range(v.shape[0]):
-        attract[i] *= numbers[4]
-    limited_torque(mass, nonlinear, rows)
+            off -= 2.0 * math.pi * math.floor(off / (2.0 * math.pi) + 0.5)
+        error[i], largest = off, max(largest, abs(off))
+        limit = rows[EFFORT_LIMIT, i]
+        room = max(limit - abs(nonlinear[i]), _LEAST_SHARE * limit)
+        left = min(left, 1.0 + _FREE_LOAD - abs(rows[DISTURBANCE, i]) / room)
+    if not math.isnan(numbers[_KAPPA]):
+        distance = torus_distance(error, joint_index, sample[_WEIGHTS], numbers[_KAPPA])
+        # In the reciprocal gauge with α = 1, as `require_smooth_goal` has it.
+        write_gauge_gradient(
+            log_psi_gradient, distance, error, 1.0, numbers[_LOG_PSI], 0.0, -1.0, attract
+        )
+    weaker = min(1.0, _LARGEST_GAIN / (numbers[_VELOCITY_GAIN] * late))
+    stiffness, damping = numbers[_POSITION_GAIN] * weaker**2, numbers[_VELOCITY_GAIN] * weaker
+    for i in range(n):
+        velocity, most = sample[_VELOCITY, i], damping * rows[VELOCITY_LIMIT, i]
+        pull = min(max(stiffness * attract[i], -most), most)
+        attract[i] = pull - damping * (rows[AHEAD_VELOCITY, i] - rate * velocity)
+        rows[BRAKE, i] = rate * rate * sample[_ACCELERATION, i] + numbers[_CHANGE] * velocity
+    robust_torque(mass, nonlinear, damping, elapsed, late, rows)
+    send(gravity, rows, sent)
+    waiting = max(largest - _FREE_ERROR, 0.0) / _WAITING_ERROR
+    wanted = math.sqrt(max(left, _LEAST_SHARE)) / (1.0 + waiting * waiting)
+    step = min(_CLOCK_RATE * elapsed, 1.0)
+    change = numbers[_CHANGE] + step * (_CLOCK_RATE * (wanted - rate) - 2.0 * numbers[_CHANGE])
+    numbers[_CHANGE], numbers[_RATE] = change, max(rate + elapsed * change, 0.0)
     return largest

@@ -22,7 +22,7 @@ class TimingParameters:
     """Shares of the limits that a motion may use; the rest is left to feedback.
 
     Raises:
-        InvalidValueError: a share outside (0, 1].
+        InvalidValueError: a share outside (0, 1], or a jerk that is not positive.
     """
 
     velocity_share: float = 0.95
@@ -31,11 +31,17 @@ class TimingParameters:
     """Share of the acceleration limits."""
     torque_share: float = 0.9
     """Share of the torque limits."""
+    torque_rate_share: float = 0.9
+    """Share of the limits of the change of torque, where the arm has any."""
+    jerk: float | None = None
+    """Largest jerk of any joint [rad/s³ or m/s³], below the arm's own limits; None for those."""
 
     def __post_init__(self) -> None:
-        for name in ("velocity_share", "acceleration_share", "torque_share"):
-            if not 0.0 < getattr(self, name) <= 1.0:
-                raise InvalidValueError(name, getattr(self, name), "above 0 and at most 1")
+        for name, value in vars(self).items():
+            if name.endswith("_share") and not 0.0 < value <= 1.0:
+                raise InvalidValueError(name, value, "above 0 and at most 1")
+        if self.jerk is not None:
+            positive("jerk", self.jerk)
 
 
 class MotionSample(NamedTuple):

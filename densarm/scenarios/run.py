@@ -23,6 +23,7 @@ from densarm.planning.guide import Guide, GuidePath
 from densarm.planning.motion import Motion, PlanningError
 from densarm.planning.plan import GUIDES, inside_limits, plan_motion, plan_path
 from densarm.scenarios.scenario import ControlForm, Scenario, load_scenario
+from densarm.simulation.disturbances import Disturbances
 from densarm.simulation.plants import Plant
 from densarm.simulation.run import Run
 from densarm.simulation.simulate import OnProgress, simulate_task
@@ -54,6 +55,9 @@ def run(
     guide: Guide | str | None = None,
     seed: int | None = None,
     on_progress: OnProgress = lambda _: None,
+    *,
+    plant: Plant | str | None = None,
+    disturbances: Disturbances | None = None,
 ) -> Run:
     """Plan and run a scenario's closed loop.
 
@@ -62,14 +66,17 @@ def run(
         guide: one of `GUIDES`, or a `Guide`; None for the scenario's own.
         seed: of the guide's random choices; None for the scenario's own.
         on_progress: told what is being done.
+        plant: "pinocchio", "mujoco", or a plant of one's own; None for the scenario's.
+        disturbances: how the plant differs from the arm's model; None for the scenario's own.
 
     Returns:
         The recorded run, its guide and seed as they were. Whatever happened is its `outcome`, not
         an exception. The same scenario and seed give the same run, bit for bit.
 
     Raises:
-        InvalidValueError: a guide of an unknown name, or a seed that is not a whole number.
-        DensarmError: a scenario that cannot be loaded.
+        InvalidValueError: a guide or plant of an unknown name, a seed that is not a whole number,
+            or disturbances of another arm.
+        DensarmError: a scenario that cannot be loaded, or MuJoCo is not installed.
     """
     chosen = scenario if isinstance(scenario, Scenario) else load_scenario(scenario)
     if isinstance(guide, str):
@@ -77,8 +84,13 @@ def run(
         chosen = replace(chosen, control=control)
     if seed is not None:
         chosen = replace(chosen, seed=seed)
+    if isinstance(plant, str):
+        chosen = replace(chosen, plant=plant)
+    if disturbances is not None:
+        chosen = replace(chosen, disturbances=disturbances)
     own = None if guide is None or isinstance(guide, str) else guide
-    return run_by(chosen, lambda scenario: by_density(scenario, own), on_progress)
+    other = None if isinstance(plant, str) else plant
+    return run_by(chosen, lambda scenario: by_density(scenario, own), on_progress, other)
 
 
 def run_by(
@@ -99,7 +111,8 @@ def run_by(
         searched = error.outcome == Outcome.NO_PATH
         return replace(ended, plan_time=time.perf_counter() - began if searched else 0.0)
     elapsed = time.perf_counter() - began
-    done = simulate_task(task, world, drive.controller, plant, on_progress)
+    told = scenario.disturbances if plant is None else None
+    done = simulate_task(task, world, drive.controller, plant, told, on_progress)
     if done.outcome == Outcome.INFEASIBLE:
         return done
     led_by, stuck = (drive.path.found_by, drive.path.stuck) if drive.path else ("", "")
@@ -134,7 +147,7 @@ def by_density(scenario: Scenario, guide: Guide | None = None, *, replans: bool 
         drive.controller,
         plan_again,
         patience=0.5 * scenario.simulation.stall_time,
-        gains=scenario.gains,
+        gains=scenario.gains_of(ControlForm.REGULATION),
         period=scenario.simulation.control_period,
     )
     return replace(drive, controller=controller)
@@ -160,7 +173,8 @@ def _plan(scenario: Scenario, start: Array, guide: Guide | None) -> Drive:
             path=planned.path,
             plain=is_plain,
             margin=control.margin,
-            gains=scenario.gains,
+            gains=scenario.law_gains,
+            actuation=scenario.actuation,
             period=period,
             goal_distance=None if is_plain else scenario.goal_distance,
             speed=scenario.speed,
@@ -183,7 +197,14 @@ def _plan(scenario: Scenario, start: Array, guide: Guide | None) -> Drive:
             raise
         motion = error.motion  # the arm goes as far as the density leads, which the record shows
     distance = TorusDistance(scenario.arm, kappa=control.kappa)
-    tracking = DensityTracking(world, motion, gains=scenario.gains, goal_distance=distance, **law)
+    tracking = DensityTracking(
+        world,
+        motion,
+        gains=scenario.law_gains,
+        goal_distance=distance,
+        actuation=scenario.actuation,
+        **law,
+    )
     return Drive(tracking, motion.plan_time, motion, motion.path)
 
 
@@ -217,5 +238,5 @@ def records(run: Run) -> tuple[EnergyRecord, RantzerRecord]:
     elif control.guide != "direct":
         energy = no_energy(f"guide {control.guide!r}, whose sub-goals change U, not 'direct'")
     else:
-        energy = record_energy(run.task, density, scenario.gains, run.q, run.v, run.tau)
+        energy = record_energy(run.task, density, scenario.law_gains, run.q, run.v, run.tau)
     return energy, record_rantzer(run.task, density, run.q)

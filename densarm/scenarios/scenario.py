@@ -12,10 +12,11 @@ import numpy as np
 from densarm.arms.arm import Arm, load_arm
 from densarm.arms.catalogue import scenario_paths
 from densarm.arms.joint_space import sliding_joints
-from densarm.certificates.task import Input, SimulationParameters, Task
+from densarm.certificates.task import PLANTS, Input, SimulationParameters, Task
 from densarm.control.controller import Gains
+from densarm.control.disturbance_observer import ActuationParameters
 from densarm.control.speed_law import SpeedParameters
-from densarm.control.tracking import require_smooth_goal
+from densarm.control.tracking import TRACKING_GAINS, require_smooth_goal
 from densarm.density.goal_distance import KAPPA_MIN, TorusDistance, joint_weights
 from densarm.density.navigation_density import DensityParameters
 from densarm.density.unsafe_sets import SensingParameters
@@ -25,6 +26,7 @@ from densarm.planning.motion import TimingParameters
 from densarm.planning.plan import GUIDES, PATH_MARGIN, PLANNING_ALPHA
 from densarm.scene.loading import parse_scene
 from densarm.scene.scene import Scene
+from densarm.simulation.disturbances import Disturbances
 from densarm.values.arrays import Array
 from densarm.values.checks import (
     finite_vector,
@@ -91,7 +93,8 @@ class Scenario:
 
     Raises:
         InvalidValueError: start or goal is not a configuration, the seed is not a whole number,
-            weights are not one per joint, or the density gives no feedback that settles at a goal.
+            weights are not one per joint, the density gives no feedback that settles at a goal, or
+            a plant that velocities cannot drive, or disturbances of another arm.
         RobotDescriptionError: torque is to drive an arm with links without a mass.
     """
 
@@ -119,10 +122,16 @@ class Scenario:
     """Shares of the limits that a motion may use."""
     speed: SpeedParameters = field(default_factory=SpeedParameters)
     """Shares of the limits that regulation may use."""
-    gains: Gains = field(default_factory=Gains)
-    """K_p and K_v."""
+    gains: Gains | None = None
+    """K_p and K_v; None for those that the form of control has by default."""
+    actuation: ActuationParameters = field(default_factory=ActuationParameters)
+    """How late torque is, and how far the model is trusted."""
     simulation: SimulationParameters = field(default_factory=SimulationParameters)
     """Time step, time limit and what counts as held or stuck."""
+    plant: str = PLANTS[0]
+    """What is driven: "pinocchio", the arm's model, or "mujoco", the same in MuJoCo."""
+    disturbances: Disturbances = field(default_factory=Disturbances)
+    """How it differs from the model."""
     seed: int = 0
     """Seed of every random choice."""
 
@@ -131,10 +140,15 @@ class Scenario:
             q = self.arm.check_configuration(f"{key} configuration", getattr(self, key))
             object.__setattr__(self, key, q)
         non_negative_integer("seed", self.seed)
+        self.disturbances.require_fit(self.arm)
+        one_of("plant", self.plant, PLANTS)
         joint_weights("density.weights", self.arm, self.density.weights)
         form = self.control.form
         if form != ControlForm.VELOCITY:
             self.arm.require_masses(f"control.form = {str(form)!r}")
+        elif self.plant != PLANTS[0] or self.disturbances.of_the_body:
+            allowed = "another where plant or disturbances of its body are set, which take torque"
+            raise InvalidValueError("control.form", str(form), allowed)
         may_blend = form in {ControlForm.REGULATION, ControlForm.PLAIN}
         require_smooth_goal(self.density, may_blend=may_blend, form=str(form))
 
@@ -142,6 +156,15 @@ class Scenario:
     def world(self) -> World:
         """The arm among the obstacles, made when first asked for."""
         return World(self.arm, self.scene)
+
+    def gains_of(self, form: ControlForm) -> Gains:
+        """Return K_p and K_v, as given or as a form of control has them by default."""
+        return self.gains or (TRACKING_GAINS if form == ControlForm.TRACKING else Gains())
+
+    @property
+    def law_gains(self) -> Gains:
+        """K_p and K_v of the scenario's form of control."""
+        return self.gains_of(self.control.form)
 
     @property
     def goal_distance(self) -> TorusDistance:
@@ -156,7 +179,12 @@ class Scenario:
             margin=self.control.margin,
             kappa=self.control.kappa,
             input=Input.VELOCITY if self.control.form == ControlForm.VELOCITY else Input.TORQUE,
-            settings={"seed": self.seed, **{key: asdict(getattr(self, key)) for key in _SETTINGS}},
+            disturbances=self.disturbances.given,
+            settings={
+                "seed": self.seed,
+                **{key: asdict(getattr(self, key)) for key in _SETTINGS},
+                "gains": asdict(self.law_gains),
+            },
         )
 
     @classmethod
@@ -176,7 +204,11 @@ class Scenario:
         return cls(
             **{key: getattr(task, key) for key in _SHARED},
             seed=settings.get("seed", 0),
-            **{key: parse_table(key, TABLES[key], tables.get(key, {})) for key in _SETTINGS},
+            disturbances=parse_table("disturbances", Disturbances, task.disturbances),
+            **{
+                key: parse_table(key, TABLES[key], tables.get(key, {}))
+                for key in (*_SETTINGS, "gains")
+            },
         )
 
 
@@ -188,13 +220,17 @@ TABLES: Mapping[str, type[Any]] = {
     "timing": TimingParameters,
     "speed": SpeedParameters,
     "gains": Gains,
+    "actuation": ActuationParameters,
     "simulation": SimulationParameters,
+    "disturbances": Disturbances,
 }
 """The optional tables of a scenario file and what they hold."""
 
-_SETTINGS = ("control", "planning", "timing", "speed", "gains")  # that a task does not hold itself
-_SHARED = ("name", "title", "arm", "scene", "start", "goal", "density", "sensing", "simulation")
-_KEYS = {"title", "robot", "scene", "obstacles", "task", "seed", *TABLES}
+# What a task does not hold itself, beside the gains.
+_SETTINGS = ("control", "planning", "timing", "speed", "actuation")
+_OF_TASK = ("density", "sensing", "simulation", "plant")
+_SHARED = ("name", "title", "arm", "scene", "start", "goal", *_OF_TASK)
+_KEYS = {"title", "robot", "scene", "obstacles", "task", "plant", "seed", *TABLES}
 
 
 def load_scenario(scenario: str | Path) -> Scenario:
@@ -236,8 +272,13 @@ def _parse(path: Path, data: dict[str, Any]) -> Scenario:
         scene=Scene(scene),
         start=_configuration(arm, "task.start", task.start),
         goal=_configuration(arm, "task.goal", task.goal),
+        plant=data.get("plant", PLANTS[0]),
         seed=data.get("seed", 0),
-        **{key: parse_table(key, kind, data.get(key, {})) for key, kind in TABLES.items()},
+        **{
+            key: parse_table(key, kind, data.get(key, {}))
+            for key, kind in TABLES.items()
+            if key != "gains" or key in data
+        },
     )
 
 
@@ -252,6 +293,8 @@ class _RobotTable:
     cut_joints: tuple[str, ...] = ()
     base_placement: tuple[float, float, float, float, float, float, float] | None = None
     acceleration: tuple[float, ...] | None = None
+    torque_rate: tuple[float, ...] | float | None = None
+    jerk: tuple[float, ...] | float | None = None
     shapes: str | None = None
     collision_from_visual: str | None = None
     inertia: str | None = None
@@ -270,15 +313,14 @@ def _parse_robot(folder: Path, table: _RobotTable) -> Arm:
     if bool(name) == bool(urdf):
         allowed = "a table with either name or urdf"
         raise InvalidValueError("robot", {"name": name, "urdf": urdf}, allowed)
-    changes = {key: given.pop(key) for key in ("base_placement", "acceleration")}
-    changes = {key: value for key, value in changes.items() if value is not None}
+    placement = given.pop("base_placement")
     arm = load_arm(
         name or folder / urdf,
         srdf=folder / srdf if srdf else None,
         package_dirs=[folder / item for item in folders],
         **given,
     )
-    return Arm(replace(arm.description, **changes)) if changes else arm
+    return arm if placement is None else Arm(replace(arm.description, base_placement=placement))
 
 
 def _configuration(arm: Arm, key: str, value: str | tuple[float, ...]) -> Array:

@@ -9,12 +9,23 @@ import pinocchio as pin
 from densarm.arms.arm import Arm
 from densarm.arms.joint_space import ConfigurationSpace
 from densarm.certificates.task import Input, Integrator
+from densarm.errors import InvalidValueError
+from densarm.simulation.disturbances import Disturbances
 from densarm.values.arrays import Array
 from densarm.values.checks import non_negative, one_of, positive
+from densarm.values.kernels import compiled
+
+_SWEEPS = 200  # over the joints, in search of the friction that holds them
+_SETTLED = 1e-12  # [rad/s or m/s], change of a sweep
 
 
 class Plant(Protocol):
-    """A simulated arm. One with an attribute `input` that is "velocity" is told velocities."""
+    """A simulated arm. One with an attribute `input` that is "velocity" is told velocities.
+
+    A method `describe_contact()`, if there is one, returns what touched in the last step, as a
+    phrase, and ends a run as `collided`. An attribute `disturbances` tells how it differs from the
+    arm's model.
+    """
 
     @property
     def dt(self) -> float:
@@ -37,31 +48,58 @@ class PinocchioPlant:
 
     .. math:: \ddot q = M(q)^{-1} (\tau - H(q, \dot q))
 
+    Where it has friction, viscous D and dry c, the velocity after a step is that of
+
+    .. math:: (M + \Delta t D)\,\dot q^+ = M \dot q + \Delta t\,(\tau - H - f), \quad
+        f_i = c_i \operatorname{sign} \dot q^+_i \ \text{or} \ \dot q^+_i = 0, |f_i| \le c_i,
+
+    so that a joint sticks as long as friction can hold it.
+
     Args:
         arm: the arm.
         dt: time step [s].
         integrator: see `Integrator`.
+        disturbances: how the arm differs from its model; `simulate` adds those of signals.
 
     Raises:
         RobotDescriptionError: the arm has links without a mass.
+        InvalidValueError: friction under another integrator than the first, or disturbances of
+            another arm.
 
-    Source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7.
+    Source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7; Stewart and Trinkle, An implicit
+        time-stepping scheme for rigid body dynamics, 1996, for friction.
     """
 
     input = Input.TORQUE
+    name = "pinocchio"
 
     def __init__(
-        self, arm: Arm, dt: float = 0.001, integrator: Integrator = Integrator.SEMI_IMPLICIT_EULER
+        self,
+        arm: Arm,
+        dt: float = 0.001,
+        integrator: Integrator = Integrator.SEMI_IMPLICIT_EULER,
+        disturbances: Disturbances = Disturbances(),
     ) -> None:
         arm.require_masses("a plant driven by torque")
-        self._model = arm.model
-        self._data = arm.model.createData()
+        self.disturbances = disturbances
+        self._model = disturbances.model(arm) if disturbances.of_the_body else arm.model
+        self._data = self._model.createData()
         self.dt = dt
         self._integrator = one_of("integrator", integrator, list(Integrator))
+        self._viscous = disturbances.joint_values("viscous", arm)
+        self._coulomb = disturbances.joint_values("coulomb", arm)
+        self._has_friction = bool(self._viscous.any() or self._coulomb.any())
+        self._friction = np.zeros(arm.nv)
+        if self._has_friction and integrator != Integrator.SEMI_IMPLICIT_EULER:
+            allowed = f"{str(Integrator.SEMI_IMPLICIT_EULER)!r} where joints have friction"
+            raise InvalidValueError("integrator", str(integrator), allowed)
 
     def step(self, q: Array, v: Array, u: Array) -> tuple[Array, Array]:
         """Act as `Plant.step`, u the torque [N·m or N]."""
         dt, model, data = self.dt, self._model, self._data
+        if self._has_friction:
+            v = self._after_friction(q, v, u)
+            return pin.integrate(model, q, dt * v), v
         a1 = pin.aba(model, data, q, v, u).copy()
         if self._integrator == Integrator.SEMI_IMPLICIT_EULER:
             v = v + dt * a1
@@ -74,6 +112,38 @@ class PinocchioPlant:
         a4 = pin.aba(model, data, pin.integrate(model, q, dt * v3), v4, u)
         step = dt / 6.0 * (v + 2.0 * v2 + 2.0 * v3 + v4)
         return pin.integrate(model, q, step), v + dt / 6.0 * (a1 + 2.0 * a2 + 2.0 * a3 + a4)
+
+    def _after_friction(self, q: Array, v: Array, u: Array) -> Array:
+        dt, upper = self.dt, np.triu(pin.crba(self._model, self._data, q))
+        mass = upper + np.triu(upper, 1).T
+        inverse = np.linalg.inv(mass + dt * np.diag(self._viscous))
+        bias = pin.nonLinearEffects(self._model, self._data, q, v)
+        free = inverse @ (mass @ v + dt * (u - bias))
+        return _with_dry_friction(free, dt * inverse, self._coulomb, self._friction)
+
+
+@compiled
+def _with_dry_friction(free: Array, inverse: Array, most: Array, friction: Array) -> Array:
+    """Return the velocity (nv,) [rad/s or m/s] with dry friction, by projected Gauss-Seidel.
+
+    Args:
+        free: velocity without it (nv,).
+        inverse: what a unit of torque during the step adds to the velocity (nv, nv).
+        most: largest friction (nv,) [N·m or N].
+        friction: that of the step before, where the search begins; overwritten (nv,).
+    """
+    v = free - inverse @ friction
+    for _ in range(_SWEEPS):
+        largest = 0.0
+        for i in range(v.size):
+            held = friction[i] + v[i] / inverse[i, i]
+            change = min(most[i], max(-most[i], held)) - friction[i]
+            friction[i] += change
+            v -= change * inverse[:, i]
+            largest = max(largest, abs(change) * inverse[i, i])
+        if largest < _SETTLED:
+            break
+    return v
 
 
 class NoiseScaling(StrEnum):

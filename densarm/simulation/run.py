@@ -13,10 +13,12 @@ import numpy as np
 from densarm.certificates.certificate import Certificate, certify
 from densarm.certificates.task import Input, Task
 from densarm.errors import DensarmError, FileContentError
+from densarm.simulation.disturbances import Disturbances
 from densarm.values.arrays import Array
 from densarm.values.documented import documented
 from densarm.values.files import atomic_file
 from densarm.values.outcome import Outcome
+from densarm.values.tables import parse_table
 from densarm.world.world import World, base_overlaps
 
 _MAX_BYTES = 4_000_000_000  # unpacked; the longest run of a seven-joint arm has half of it
@@ -40,8 +42,8 @@ class Run:
     v: Array
     """Velocities (N, nv) [rad/s or m/s]."""
     tau: Array
-    """Torque held from each sample to the next (N, nv) [N·m or N]; the last row repeats. Zero where
-    the plant is told velocities."""
+    """Torque commanded from each sample to the next (N, nv) [N·m or N], without what delays it; the
+    last row repeats. Zero where the plant is told velocities."""
     clearance: Array
     """Smallest signed distance over all pairs (N,) [m]; infinite without pairs."""
     outcome: Outcome
@@ -126,6 +128,8 @@ class Run:
             "plan_time_s": self.plan_time,
             "preparation_time_s": self.preparation_time,
             "certified": self.certified,
+            "plant": self.task.plant,
+            "disturbances": dict(self.task.disturbances),
         }
 
     def save(self, path: str | Path) -> None:
@@ -197,6 +201,7 @@ class Run:
 
     def _checked(self) -> "Run":
         n, arm = len(self.time), self.task.arm
+        parse_table("disturbances", Disturbances, self.task.disturbances)
         shapes = {"time": (n,), "q": (n, arm.nq), "v": (n, arm.nv), "tau": (n, arm.nv)}
         for name, shape in {**shapes, "clearance": (n,)}.items():
             array = getattr(self, name)

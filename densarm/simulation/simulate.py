@@ -1,12 +1,13 @@
 """The fixed-step loop: any controller around any plant, judged and recorded."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from densarm.certificates.task import (
+    PLANTS,
     REACHED_POSITION,
     REACHED_VELOCITY,
     Input,
@@ -15,6 +16,7 @@ from densarm.certificates.task import (
 )
 from densarm.control.controller import Controller, VelocityController
 from densarm.errors import InvalidValueError
+from densarm.simulation.disturbances import Disturbances, Signals
 from densarm.simulation.plants import PinocchioPlant, Plant, SingleIntegrator
 from densarm.simulation.run import Run
 from densarm.values.arrays import Array
@@ -40,7 +42,8 @@ def simulate(
     start: ArrayLike,
     goal: ArrayLike | None = None,
     *,
-    plant: Plant | None = None,
+    plant: Plant | str | None = None,
+    disturbances: Disturbances | None = None,
     parameters: SimulationParameters = SimulationParameters(),
     title: str = "run",
     on_progress: OnProgress = lambda _: None,
@@ -55,11 +58,14 @@ def simulate(
     Args:
         world: the arm among obstacles, as they are now, or in motion.
         controller: called at each control period, with the time since the run began. Its
-            attributes `goal`, `motion`, `tracking_error`, `remark` and `describe_stall`, if any,
-            tell what it wants, how long it moves, and why it rests.
+            attributes `goal`, `motion`, `is_moving`, `tracking_error`, `remark` and
+            `describe_stall`, if any, tell what it wants, how long it moves, and why it rests.
         start: configuration (nq,).
         goal: configuration (nq,); None for the controller's own.
-        plant: what is driven; None for the arm's model.
+        plant: what is driven; None or "pinocchio" for the arm's model, "mujoco" for the same in
+            MuJoCo.
+        disturbances: how the plant differs from the arm's model, which no controller is told; None
+            for those of a plant of one's own, or none.
         parameters: time step and limits of time.
         title: of the record.
         on_progress: told what is being done.
@@ -69,10 +75,15 @@ def simulate(
 
     Raises:
         InvalidValueError: start or goal is not a configuration, a plant of another time step or an
-            unknown input, a controller without the method for it, or a torque that is not one.
+            unknown input or name, a controller without the method for it, a torque that is not
+            one, or disturbances that a plant of one's own does not have.
+        DensarmError: MuJoCo is asked for, and not installed.
         RobotDescriptionError: no plant, and an arm with links without a mass.
     """
-    driven = plant or PinocchioPlant(world.arm, parameters.dt, parameters.integrator)
+    if isinstance(plant, str) or plant is None:
+        driven = plant_of(world, plant or PLANTS[0], parameters, disturbances or Disturbances())
+    else:
+        driven = plant
     wanted = getattr(controller, "goal", None) if goal is None else goal
     told = getattr(driven, "input", Input.TORQUE)
     task = Task(
@@ -84,7 +95,18 @@ def simulate(
         simulation=parameters,
         input=Input(one_of("input of the plant", told, list(Input))),
     )
-    return simulate_task(task, world, controller, driven, on_progress)
+    return simulate_task(task, world, controller, driven, disturbances, on_progress)
+
+
+def plant_of(
+    world: World, name: str, parameters: SimulationParameters, disturbances: Disturbances
+) -> Plant:
+    """Return one of `PLANTS` of a world's arm, told torque, as it is disturbed."""
+    if one_of("plant", name, PLANTS) == PinocchioPlant.name:
+        return PinocchioPlant(world.arm, parameters.dt, parameters.integrator, disturbances)
+    from densarm.simulation.mujoco_plant import MujocoPlant  # which is slow to import
+
+    return MujocoPlant(world, parameters.dt, disturbances)
 
 
 def simulate_task(
@@ -92,16 +114,27 @@ def simulate_task(
     world: World,
     controller: Controller | VelocityController,
     plant: Plant | None = None,
+    disturbances: Disturbances | None = None,
     on_progress: OnProgress = lambda _: None,
 ) -> Run:
     """Run a controller on a task; as `simulate`, which makes the task.
 
-    None for a plant is the arm's model, or for a task of velocities the arm that has them.
+    None for a plant is the task's, or for a task of velocities the arm that has them.
     """
-    parameters = task.simulation
+    parameters, own = task.simulation, getattr(plant, "disturbances", Disturbances())
+    told = own if disturbances is None else disturbances
     if plant is None and task.input == Input.VELOCITY:
-        plant = SingleIntegrator(world.arm, parameters.dt)
-    driven = plant or PinocchioPlant(world.arm, parameters.dt, parameters.integrator)
+        if task.plant != PinocchioPlant.name:
+            raise InvalidValueError("plant", task.plant, "'pinocchio' where velocities are told")
+        driven: Plant = SingleIntegrator(world.arm, parameters.dt)
+    else:
+        driven = plant or plant_of(world, task.plant, parameters, told)
+    told.require_fit(world.arm)
+    if told.of_the_body != getattr(driven, "disturbances", Disturbances()).of_the_body:
+        allowed = "those of the plant, which is given its own when it is made"
+        raise InvalidValueError("disturbances", list(told.of_the_body), allowed)
+    name = getattr(driven, "name", PinocchioPlant.name)
+    task = replace(task, plant=name, disturbances=told.given)
     if driven.dt != parameters.dt:
         raise InvalidValueError("dt of the plant", driven.dt, f"the loop's, {parameters.dt}")
     if not callable(getattr(controller, task.input, None)):
@@ -110,7 +143,8 @@ def simulate_task(
     world.set_time(0.0)
     if fault := infeasibility(SweptCheck(world, task.margin), {"start": task.start}):
         return Run.at_rest(task, world, Outcome.INFEASIBLE, fault)
-    return _Loop(task, world, controller, driven).run(on_progress)
+    signals = Signals(told, world.arm, parameters.dt)
+    return _Loop(task, world, controller, driven, signals).run(on_progress)
 
 
 @dataclass(eq=False)
@@ -121,6 +155,7 @@ class _Loop:
     world: World
     controller: Controller | VelocityController
     plant: Plant
+    signals: Signals
     q: list[Array] = field(default_factory=list)
     v: list[Array] = field(default_factory=list)
     clearance: list[float] = field(default_factory=list)
@@ -139,18 +174,20 @@ class _Loop:
         self._record(q, v)
         for k in range(round(p.time_limit / p.dt)):
             if k % p.control_divisor == 0:
-                u = self._input(k * p.dt, q, v)
+                u = self._input(k * p.dt, *self.signals.measured(q, v))
                 error = getattr(self.controller, "tracking_error", None)
                 if error is not None:
                     tracking_error = max(float(error), tracking_error or 0.0)
-            q, v = self.plant.step(q, v, u)
+            q, v = self.plant.step(q, self.signals.pushed(k * p.dt, v), self.signals.acting(u))
             self.world.set_time((k + 1) * p.dt)
             inputs.append(u)
             if touching := self._record(q, v):
                 outcome, detail = Outcome.COLLIDED, f"{touching} at t = {(k + 1) * p.dt:.3f} s"
                 break
             held = held + 1 if self._is_at_goal(q, v) else 0
-            if k * p.dt <= moves_until or self._distance(q, rest) > _STALL_MOTION:
+            moves = getattr(self.controller, "is_moving", None)
+            moves = k * p.dt <= moves_until if moves is None else moves
+            if moves or self._distance(q, rest) > _STALL_MOTION:
                 rest, rested_since = q, k
             if held * p.dt >= p.hold_time:
                 outcome, detail = Outcome.REACHED, ""
@@ -182,12 +219,16 @@ class _Loop:
         return np.array(u, np.float64)  # a controller may write the next one into the same array
 
     def _record(self, q: Array, v: Array) -> str:
-        """Keep a state; return what touches there, as a phrase."""
+        """Keep a state; return what touches there, or in the step before, as a phrase."""
         distance, pair = self._pairs.smallest(q)
         self.q.append(q.copy())  # as may a plant
         self.v.append(v.copy())
         self.clearance.append(distance)
-        return " and ".join(self.world.pairs[pair]) if distance <= 0.0 else ""
+        touching = " and ".join(self.world.pairs[pair]) if distance <= 0.0 else ""
+        told = getattr(self.plant, "describe_contact", str)()
+        if not told:
+            return touching
+        return f"{touching or told} ({told}, smallest distance {1e3 * distance:.3g} mm by coal)"
 
     def _is_at_goal(self, q: Array, v: Array) -> bool:
         if self.task.goal is None or np.abs(v).max() > _HELD_SHARE * REACHED_VELOCITY:

@@ -1,5 +1,6 @@
 """Baselines: the density and what it is compared with, by name, from a scenario to its drive."""
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import NamedTuple, Protocol
@@ -67,7 +68,7 @@ def density_moving(scenario: Scenario, scale: float = 1.0) -> Drive:
         scenario.goal_distance,
         _scaled(scenario, scale),
         scenario.control.margin,
-        scenario.gains,
+        scenario.gains_of(ControlForm.REGULATION),
         scenario.simulation.control_period,
     )
     return _regulated(scenario, field)
@@ -81,7 +82,7 @@ def control_density(scenario: Scenario, scale: float = 1.0) -> Drive:
         scenario.goal_distance,
         _scaled(scenario, scale),
         scenario.control.margin,
-        scenario.gains,
+        scenario.gains_of(ControlForm.REGULATION),
     )
     return _regulated(scenario, field)
 
@@ -107,7 +108,7 @@ def plan_then_track(scenario: Scenario, scale: float = 1.0) -> Drive:
     drive = density(scenario, scale)
     if drive.motion is None:
         return drive
-    return replace(drive, controller=ComputedTorque(scenario.arm, drive.motion, scenario.gains))
+    return replace(drive, controller=ComputedTorque(scenario.arm, drive.motion, scenario.law_gains))
 
 
 BASELINES: Mapping[str, Baseline] = {
@@ -188,7 +189,7 @@ class ComputedTorque:
         q, v = checked_state(self._arm, q, v)
         point = self.motion.sample(t, lead=0.5 * self.motion.period)
         self.tracking_error = _write_error(point.position, q, self._arm.joint_index, self._error)
-        self._dynamics.update(q, v)
+        self._dynamics.update(math.nan, q, v)
         brake = point.acceleration - self._gains.velocity * (v - point.velocity)
         return self._dynamics.torque(brake, -self._gains.position * self._error)
 
@@ -223,7 +224,7 @@ def _by_density(scenario: Scenario, scale: float, form: ControlForm, guide: str)
 def _follow(scenario: Scenario, field: type[BarrierField], *parameters: float) -> Drive:
     """Return what follows a field; each gets the same distances, margin and pull."""
     barriers = Barriers(scenario.world, scenario.control.margin)
-    distance, rate = scenario.goal_distance, scenario.gains.rate
+    distance, rate = scenario.goal_distance, scenario.gains_of(ControlForm.REGULATION).rate
     return _regulated(scenario, field(barriers, scenario.goal, distance, rate, *parameters))
 
 
@@ -234,5 +235,5 @@ def _regulated(scenario: Scenario, field: VelocityField) -> Drive:
     if fault := infeasibility(SweptCheck(world, margin), ends):
         raise PlanningError(Outcome.INFEASIBLE, fault)
     law = SpeedLaw(world, margin, scenario.speed)
-    period = scenario.simulation.control_period
-    return Drive(FieldRegulation(scenario.arm, field, law, scenario.gains, period))
+    gains, period = scenario.gains_of(ControlForm.REGULATION), scenario.simulation.control_period
+    return Drive(FieldRegulation(scenario.arm, field, law, gains, period))

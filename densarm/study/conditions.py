@@ -1,6 +1,5 @@
 """Conditions: what a comparison does to an arm without telling its controllers."""
 
-import copy
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -10,6 +9,7 @@ from densarm.errors import DensarmError
 from densarm.scenarios.scenario import Scenario
 from densarm.scene.obstacles import Sphere
 from densarm.scene.scene import Scene
+from densarm.simulation.disturbances import Disturbances
 from densarm.simulation.plants import PinocchioPlant
 from densarm.values.arrays import Array
 from densarm.values.checks import non_negative
@@ -107,13 +107,8 @@ class Disturbed:
         begin: Array | None = None,
         velocity: Array | None = None,
     ) -> None:
-        heavier, simulation = copy.copy(scenario.arm), scenario.simulation
-        heavier.model = scenario.arm.model.copy()
-        if condition.payload:
-            frame = heavier.model.frames[heavier.end_effector_frame]
-            point = pin.Inertia(condition.payload, np.zeros(3), np.zeros((3, 3)))
-            heavier.model.appendBodyToJoint(frame.parentJoint, point, frame.placement)
-        self._plant = PinocchioPlant(heavier, simulation.dt, simulation.integrator)
+        simulation, heavier = scenario.simulation, Disturbances(payload=condition.payload)
+        self._plant = PinocchioPlant(scenario.arm, simulation.dt, simulation.integrator, heavier)
         self.dt = simulation.dt
         self._world, self._push, self._begin, self._velocity = scenario.world, push, begin, velocity
         self._steps = 0

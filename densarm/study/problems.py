@@ -1,27 +1,31 @@
 """Problems: from a start to a goal in a scene, one by one or in processes, and their results."""
 
 import signal
+import zlib
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import lru_cache, partial
 from multiprocessing import get_context
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any, TypeVar
 
 import numpy as np
 
 from densarm.arms.arm import Arm, load_arm
-from densarm.certificates.task import REACHED_POSITION, REACHED_VELOCITY
+from densarm.certificates.task import PLANTS, REACHED_POSITION, REACHED_VELOCITY
 from densarm.errors import FileContentError, InvalidValueError
 from densarm.planning.motion import PlanningError, TimingParameters
 from densarm.scenarios.run import run as run_scenario
 from densarm.scenarios.scenario import ControlParameters, Scenario
 from densarm.scene.loading import MotionProblem
+from densarm.simulation.disturbances import Disturbances
 from densarm.simulation.run import Run
 from densarm.values.checks import positive_integer
 from densarm.values.outcome import FAILED, RUN_ENDS, Outcome
+from densarm.values.tables import parse_table
 
 PERCENTILES = (50, 95, 98)
 
@@ -77,6 +81,10 @@ class ProblemResult:
     """Whether the certificate holds in every part."""
     led_by: str = ""
     """What found the way, as a phrase."""
+    plant: str = PLANTS[0]
+    """What was driven."""
+    disturbances: Mapping[str, Any] = field(default_factory=dict)
+    """How it differed from the arm's model."""
 
     @property
     def optimal_ratio(self) -> float | None:
@@ -191,6 +199,9 @@ def run_problem(
     guide: str = "auto",
     save_dir: Path | None = None,
     time_optimal: bool = False,
+    plant: str = PLANTS[0],
+    disturb: Mapping[str, Any] = MappingProxyType({}),
+    draw: Mapping[str, float] = MappingProxyType({}),
 ) -> ProblemResult:
     """Plan a problem, run its closed loop and prove it; an error becomes a result.
 
@@ -201,10 +212,20 @@ def run_problem(
         save_dir: folder of the recorded runs, SCENE_INDEX.npz; a problem whose record is there
             already is not run again. None to keep none.
         time_optimal: whether to compute the shortest time along the run's path.
+        plant: what is driven, "pinocchio" or "mujoco".
+        disturb: how it differs from the model, as the keys of a table ``[disturbances]``.
+        draw: what of this is drawn, as `drawn` does it.
     """
 
     def run() -> Run:
-        scenario = replace(scenario_of(problem, seed), control=ControlParameters(guide=guide))
+        scenario = scenario_of(problem, seed)
+        told = {**disturb, **drawn(draw, problem, seed, scenario.arm.nv)}
+        scenario = replace(
+            scenario,
+            control=ControlParameters(guide=guide),
+            plant=plant,
+            disturbances=parse_table("disturbances", Disturbances, told),
+        )
         if save_dir is None:
             return run_scenario(scenario)
         file = save_dir / f"{problem.scene_name}_{problem.index}.npz"
@@ -218,6 +239,26 @@ def run_problem(
         return recorded
 
     return problem_result(problem.scene_name, problem.index, run, time_optimal)
+
+
+def drawn(
+    sizes: Mapping[str, float], problem: MotionProblem, seed: int, nv: int
+) -> dict[str, list[float]]:
+    """Return disturbances, one number per joint (nv,), each drawn for itself.
+
+    Args:
+        sizes: names of disturbances: ``mass_scale`` is drawn evenly from 1 - size to 1 + size, any
+            other from 0 to its size.
+        problem: for which they are drawn, always the same for the same seed.
+        seed: of all problems.
+        nv: number of joints.
+    """
+    which = zlib.crc32(f"{problem.scene_name} {problem.index}".encode())
+    random, told = np.random.default_rng([seed, which]), {}
+    for name, size in sizes.items():
+        least = 1.0 - size if name == "mass_scale" else 0.0
+        told[name] = random.uniform(least, 1.0 + size if least else size, nv).tolist()
+    return told
 
 
 def problem_result(
@@ -341,6 +382,6 @@ def shortest_time(run: Run) -> float | None:
     path = SmoothPath(spline.t, spline.c)
     try:
         period = run.task.simulation.control_period
-        return time_path(arm, path, length, period, _ALL).duration
+        return time_path(arm, path, length, period, _ALL, has_rates=False).duration
     except PlanningError:
         return None

@@ -69,6 +69,8 @@ def test_panda() -> None:
     assert (arm.nq, arm.nv, arm.end_effector) == (7, 7, "panda_hand_tcp")
     assert not arm.continuous.any()
     np.testing.assert_array_equal(arm.limits.acceleration, [15, 7.5, 10, 12.5, 15, 20, 20])
+    np.testing.assert_array_equal(arm.limits.torque_rate, [1000.0] * 7)
+    np.testing.assert_array_equal(arm.limits.jerk, [5000.0] * 7)
     assert {"ready", "stretched"} <= set(arm.postures)
     assert {"link0.stl", "hand.stl"} <= set(arm.mesh_hashes())
     assert {item.meshPath[-4:] for item in arm.visual_model.geometryObjects} == {".dae"}
@@ -80,6 +82,20 @@ def test_locking_one_more_joint_of_a_named_arm() -> None:
     np.testing.assert_array_equal(arm.limits.acceleration, [15, 7.5, 12.5, 15, 20, 20])
     ready = load_arm("panda").postures["ready"]
     np.testing.assert_array_equal(arm.postures["ready"], np.delete(ready, 2))
+
+
+def test_limits_of_ones_own() -> None:
+    locked = {"panda_joint3": 0.1}
+    rates = np.arange(1.0, 7.0)
+    arm = load_arm(
+        "panda", locked_joints=locked, acceleration=[5.0] * 6, torque_rate=rates, jerk=np.inf
+    )
+    np.testing.assert_array_equal(arm.limits.acceleration, [5.0] * 6)
+    np.testing.assert_array_equal(arm.limits.torque_rate, rates)
+    assert np.isinf(arm.limits.jerk).all()
+    assert json.loads(json.dumps(arm.description.to_json(), allow_nan=False))["jerk"] is None
+    with pytest.raises(InvalidValueError, match=r"jerk = .*\(6,\), got \(7,\)"):
+        load_arm("panda", locked_joints=locked, jerk=[1.0] * 7)
 
 
 # From a file
@@ -94,6 +110,7 @@ def test_urdf_file(branching: Arm) -> None:
     np.testing.assert_array_equal(branching.limits.velocity, [2.0, 0.5, 3.0, 3.0, np.inf])
     np.testing.assert_array_equal(branching.limits.effort, [50.0, 100.0, 20.0, 20.0, np.inf])
     np.testing.assert_array_equal(branching.limits.acceleration, [10.0] * 5)
+    assert np.isinf([branching.limits.torque_rate, branching.limits.jerk]).all()
     assert set(branching.mesh_hashes()) == {"wedge.stl"}
 
 
@@ -281,6 +298,7 @@ def test_wrong_choice_of_joints(robot: str | Path, options: dict[str, Any], mess
 def test_chosen_joints_of_a_named_arm() -> None:
     arm = load_arm("panda", joints=["panda_joint2", "panda_joint4"])
     np.testing.assert_array_equal(arm.limits.acceleration, [7.5, 12.5])
+    np.testing.assert_array_equal(arm.limits.jerk, [5000.0] * 2)
     ready = load_arm("panda").postures["ready"]
     np.testing.assert_array_equal(arm.postures["ready"], ready[[1, 3]])
 

@@ -29,7 +29,8 @@ def test_json_rebuilds_the_arm(shapes: str) -> None:
     assert description == arm.description
     again = Arm(description)
     assert again.mesh_hashes() == arm.mesh_hashes()
-    np.testing.assert_array_equal(again.limits.acceleration, arm.limits.acceleration)
+    for name in ("acceleration", "torque_rate", "jerk"):
+        np.testing.assert_array_equal(getattr(again.limits, name), getattr(arm.limits, name))
     assert again.postures.keys() == arm.postures.keys()
 
 
@@ -45,6 +46,13 @@ def test_json_with_a_key_missing(key: str) -> None:
     del data[key]
     with pytest.raises(DensarmError, match=rf"robot description.*{key}"):
         RobotDescription.from_json(data)
+
+
+def test_json_from_before_there_were_limits_of_jerk_and_torque_rate() -> None:
+    data = robot_description("panda").to_json()
+    del data["jerk"], data["torque_rate"]
+    limits = Arm(RobotDescription.from_json(data)).limits
+    assert np.isinf([limits.jerk, limits.torque_rate]).all()
 
 
 @pytest.mark.parametrize("data", [{}, [], {"postures": 3}])
@@ -83,6 +91,10 @@ def test_xml() -> None:
         ({"acceleration": (1.0,)}, r"acceleration = .*\(2,\), got \(1,\)"),
         ({"acceleration": (1.0, 0.0)}, "acceleration = 0.0: must be a finite number > 0"),
         ({"acceleration": (1.0, float("nan"))}, "acceleration = .*finite"),
+        ({"jerk": (1.0,)}, r"jerk = .*\(2,\), got \(1,\)"),
+        ({"jerk": -1.0}, "jerk = -1.0: must be a finite number > 0"),
+        ({"torque_rate": "fast"}, "torque_rate = .*: must be 2 numbers"),
+        ({"torque_rate": (1.0, float("inf"))}, "torque_rate = .*finite"),
         ({"end_effector": "hook"}, "unknown end-effector frame 'hook'"),
         ({"postures": {"odd": (1.0,)}}, r"angles = .*\(2,\), got \(1,\)"),
         ({"base_placement": (0.0,) * 7}, "base_placement orientation.*unit quaternion"),

@@ -47,6 +47,31 @@ def test_an_honest_run(swing_up_run: Run) -> None:
     assert swing_up_run.certified
 
 
+def failing_if(run: Run, **claims: Any) -> set[str]:
+    """Return the failing parts where the record claims another plant; replay never passes."""
+    certificate = replace(run, task=replace(run.task, **claims)).certificate
+    replayed = next(check for check in certificate.checks if check.name == "replay")
+    assert replayed.holds is None
+    assert "does not apply" in replayed.detail
+    return {check.name for check in certificate.checks if check.holds is False}
+
+
+def test_replay_does_not_apply_to_another_plant_and_all_else_does(swing_up_run: Run) -> None:
+    assert failing_if(swing_up_run, plant="mujoco") == set()
+    assert failing_if(swing_up_run, disturbances={"payload": 1.0}) == set()
+    moved_goal = moved(swing_up_run, goal=(3.13, 0.02))
+    assert failing_if(replace(swing_up_run, task=moved_goal), plant="mujoco") == {"goal"}
+    heavy = replace(swing_up_run, task=replace(swing_up_run.task, disturbances={"payload": 1.0}))
+    assert "not of the disturbed plant" in heavy.certificate.checks[-1].detail
+
+
+def test_noise_of_sensors_leaves_the_plant_to_be_replayed(swing_up_run: Run) -> None:
+    noisy = replace(swing_up_run.task, disturbances={"encoder_noise": 1e-4, "seed": 1})
+    assert failing(replace(swing_up_run, task=noisy)) == set()
+    wrong = tampered(replace(swing_up_run, task=noisy), "tau", 100, 0, 1.0)
+    assert failing(wrong) == {"replay"}
+
+
 def test_start_moved(swing_up_run: Run) -> None:
     task = moved(swing_up_run, start=(1e-6, 0.0))
     assert failing(replace(swing_up_run, task=task)) == {"start"}

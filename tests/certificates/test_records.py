@@ -65,7 +65,7 @@ def free_run(swing_up: Scenario) -> Run:
 
 def unlimited_run(scenario: Scenario, steps: int) -> tuple[Array, Array, Array]:
     """States and torques under the law itself, with neither speed law nor backup filter."""
-    arm, gains, p = scenario.arm, scenario.gains, scenario.simulation
+    arm, gains, p = scenario.arm, scenario.law_gains, scenario.simulation
     density, plant = density_of(scenario), PinocchioPlant(arm, p.dt, p.integrator)
     q, v, states = scenario.start, np.zeros(arm.nv), []
     for _ in range(steps):

@@ -136,7 +136,7 @@ def test_a_run_of_version_0_1_keeps_all_that_it_was_made_with() -> None:
         "regulation",
         "direct",
     )
-    assert (scenario.gains.position, scenario.gains.velocity) == (100.0, 25.0)
+    assert (scenario.law_gains.position, scenario.law_gains.velocity) == (100.0, 25.0)
     assert (scenario.control.kappa, scenario.speed.braking_share) == (2.0, 0.9)
     assert [body.name for body in scenario.scene] == ["crate", "ball"]
     assert run.task.simulation.control_divisor == 2

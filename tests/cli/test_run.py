@@ -27,6 +27,8 @@ KEYS = [
     "plan_time_s",
     "preparation_time_s",
     "certified",
+    "plant",
+    "disturbances",
 ]
 BALL = """
 [[obstacles]]
@@ -240,3 +242,19 @@ def test_what_was_read_otherwise_and_what_is_not_checked_is_told(
     assert re.search(r"not checked +'base_0' is in 'table' by \d+ mm: neither moves\n", done.out)
     (overlap,) = Run.load(tmp_path / "run.npz").base_overlaps
     assert overlap.startswith("'base_0' is in 'table' by ")
+
+
+def test_a_disturbed_arm_in_mujoco(
+    command: Command, scenario_file: Callable[..., Path], tmp_path: Path
+) -> None:
+    told = ["--disturb", "coulomb=0.01", "--disturb", "mass_scale=[1.0, 1.02]"]
+    path = tmp_path / "run.json"
+    done = command("run", scenario_file(), "--plant", "mujoco", *told, "--json", path)
+    assert (done.status, done.err) == (0, "")
+    assert "mujoco, mass_scale [1.0, 1.02], coulomb 0.01" in done.out
+    assert (
+        "does not apply: the record says that the plant is mujoco, disturbed by coulomb" in done.out
+    )
+    data = json.loads(path.read_text(encoding="utf-8"))
+    assert data["plant"] == "mujoco"
+    assert data["disturbances"] == {"mass_scale": [1.0, 1.02], "coulomb": 0.01}

@@ -1,5 +1,6 @@
 """Wrong input: one line that says what is wrong and what is allowed, and nothing left behind."""
 
+import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -130,3 +131,34 @@ def test_file_that_is_not_a_run(command: Command, tmp_path: Path, verb: str) -> 
 def test_arm_to_time(command: Command, tmp_path: Path) -> None:
     refused(command("bench", "step", "--arm", "atlas"), tmp_path, "'atlas'", "panda")
     refused(command("bench", "step", "--arm", "two_link", "--pairs", 3), tmp_path, "pairs = 3")
+
+
+@pytest.mark.parametrize(
+    ("option", "expected"),
+    [
+        ("friction=1", "unknown key of [disturbances] 'friction'"),
+        ("coulomb=-0.5", "disturbances.coulomb = -0.5: must be a finite number >= 0"),
+        ("payload=heavy", "disturbances.payload = 'heavy'"),
+        ("payload", "'payload': must be NAME=VALUE, as in payload=1"),
+        ("viscous=[1, 2, 3]", "one per joint of 'two_link'"),
+    ],
+)
+def test_disturbances(
+    command: Command, scenario_file: Callable[..., Path], tmp_path: Path, option: str, expected: str
+) -> None:
+    refused(command("run", scenario_file(), "--disturb", option), tmp_path, expected)
+    if option.startswith("friction"):
+        done = command("run", scenario_file(), "--disturb", option)
+        assert "armature" in done.err
+        assert "viscous" in done.err
+
+
+def test_mujoco_is_not_installed(
+    command: Command,
+    scenario_file: Callable[..., Path],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setitem(sys.modules, "mujoco", None)
+    done = command("run", scenario_file(), "--plant", "mujoco")
+    refused(done, tmp_path, "plant 'mujoco' needs MuJoCo", "pip install 'densarm[mujoco]'")

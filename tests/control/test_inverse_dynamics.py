@@ -1,5 +1,7 @@
 """Torque for wanted accelerations: limits always hold, and saturation spares braking."""
 
+import math
+
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -35,7 +37,7 @@ def states(draw: st.DrawFn, speed: float = 3.0) -> State:
 
 def at(arm: Arm, dynamics: InverseDynamics, state: State) -> State:
     q, v = arm.configuration(state[0][: arm.nv]), state[1][: arm.nv]
-    dynamics.update(q, v)
+    dynamics.update(math.nan, q, v)
     return q, v
 
 

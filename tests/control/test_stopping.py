@@ -1,5 +1,7 @@
 """Stopping: a straight line and then rest, and a filter that keeps the arm able to stop."""
 
+import math
+
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -106,7 +108,7 @@ def test_no_contact_whatever_torque_is_asked_for(seed: int) -> None:
             pull = rng.uniform(-10.0, 10.0, 2)
         distances = exact(q)
         assert (distances.distance > 0.0).all()
-        dynamics.update(q, v)
+        dynamics.update(math.nan, q, v)
         wanted = dynamics.torque(-0.2 * v, pull)
         tau = backup.torque(k * DT, dynamics, q, v, wanted, distances)
         assert (np.abs(tau) <= ARM.limits.effort).all()
@@ -119,7 +121,7 @@ def test_acceleration_changes_by_its_limit_within_a_fortieth_of_a_second_at_most
     q, v, last = ARM.postures["hanging"], np.zeros(2), np.zeros(2)
     largest = ARM.limits.acceleration * DT * 40 * (1 + 1e-6)
     for k in range(60):
-        dynamics.update(q, v)
+        dynamics.update(math.nan, q, v)
         wanted = dynamics.torque(REST, (-1) ** (k // 20) * ARM.limits.acceleration)
         tau = backup.torque(k * DT, dynamics, q, v, wanted, exact(q))
         a = np.array(pin.aba(ARM.model, ARM.data, q, v, tau))
@@ -127,7 +129,7 @@ def test_acceleration_changes_by_its_limit_within_a_fortieth_of_a_second_at_most
         last = a
         q, v = step(ARM, q, v, tau)
     assert np.abs(last).max() > 0.1
-    dynamics.update(q, v)
+    dynamics.update(math.nan, q, v)
     tau = backup.torque(1e3, dynamics, q, v, wanted, exact(q))
     a = np.array(pin.aba(ARM.model, ARM.data, q, v, tau))  # from zero again
     assert (np.abs(a) <= largest).all()
@@ -137,7 +139,7 @@ def test_what_is_harmless_is_let_through() -> None:
     backup = BackupFilter(ARM, SpeedLaw(WORLD, 0.0), Gains(), DT)
     dynamics = InverseDynamics(ARM, ARM.limits.acceleration)
     q, v = ARM.postures["hanging"], np.zeros(2)
-    dynamics.update(q, v)
+    dynamics.update(math.nan, q, v)
     wanted = dynamics.torque(v, np.array([0.5, 0.0]))
     assert backup.torque(0.0, dynamics, q, v, wanted, exact(q)) is wanted
 
@@ -151,7 +153,7 @@ def test_the_margin_of_its_speed_law_is_kept(margin: float) -> None:
     for k in range(1000):
         distances = exact(q)
         least = min(least, float(distances.distance.min()))
-        dynamics.update(q, v)
+        dynamics.update(math.nan, q, v)
         wanted = dynamics.torque(-2.0 * v, np.array([2.0, 0.0]))
         q, v = step(ARM, q, v, backup.torque(k * DT, dynamics, q, v, wanted, distances))
     assert margin < least < margin + 0.1

@@ -1,5 +1,6 @@
 """DensityTracking: its one kernel is the law of its parts, whichever pairs are queried."""
 
+import math
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -69,7 +70,7 @@ def test_torque_is_that_of_its_parts(panda: Arm, panda_swing: Motion, among_sphe
         point = panda_swing.sample(t, lead=0.5 * panda_swing.period)
         density.set_goal(panda.configuration(point.position))
         attract = density.evaluate(q).gradient(Gauge.RECIPROCAL)
-        dynamics.update(q, v)
+        dynamics.update(math.nan, q, v)
         brake = point.acceleration - GAINS.velocity * (v - point.velocity)
         expected = dynamics.torque(brake, GAINS.position * attract)
         np.testing.assert_allclose(controller.torque(t, q, v), expected, rtol=1e-12, atol=1e-12)

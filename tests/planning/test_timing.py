@@ -13,12 +13,14 @@ from hypothesis import strategies as st
 from densarm.arms.arm import Arm, load_arm
 from densarm.arms.catalogue import robot_names
 from densarm.arms.description import RobotDescription
+from densarm.arms.dynamics import JointTorques
 from densarm.errors import InvalidValueError
 from densarm.planning.motion import Motion, PlanningError, TimingParameters
 from densarm.planning.smoothing import SmoothPath, smooth_path
 from densarm.planning.timing import time_path
 from densarm.scene.obstacles import Sphere
 from densarm.scene.scene import Scene
+from densarm.values.arrays import Array
 from densarm.values.outcome import Outcome
 from densarm.world.stopping import StoppingCheck, StoppingTrajectory
 from densarm.world.world import World
@@ -136,7 +138,95 @@ def test_the_shortest_ways_are_timed_within_the_limits(
     assert (acceleration <= arm.limits.acceleration).all()
     assert (np.abs(motion.velocity) <= arm.limits.velocity).all()
     least = 2.0 * np.sqrt(np.abs(step) / arm.limits.acceleration).max()
-    assert motion.duration <= 3.0 * least + 3.0 * PERIOD
+    smooth = np.cbrt(32.0 * np.abs(step) / arm.limits.jerk).max()
+    if np.isinf(arm.limits.torque_rate).all():
+        assert motion.duration <= 3.0 * max(least, smooth) + 3.0 * PERIOD
+
+
+def rates_used(arm: Arm, motion: Motion, lead: float) -> tuple[Array, Array]:
+    """Return the largest jerk and torque rate, but for gravity's, from sample to sample (nv,)."""
+    before = [motion.sample(-1.0)]
+    after = [motion.sample(motion.duration + 1.0)]
+    times = motion.samples(motion.period).time[:-1]
+    samples = before + [motion.sample(t, lead) for t in times] + after
+    q, v, a = np.stack(samples, axis=1)
+    torques, q = JointTorques(arm), arm.configurations(q)
+    torque = torques(q, v, a) - torques(q, 0.0 * v, 0.0 * a)
+    jerk, rate = (np.abs(np.diff(rows, axis=0)).max(axis=0) for rows in (a, torque))
+    return jerk / motion.period, rate / motion.period
+
+
+def require_rates(arm: Arm, motion: Motion, parameters: TimingParameters) -> None:
+    for lead in (0.0, 0.5 * motion.period):
+        jerk, rate = rates_used(arm, motion, lead)
+        assert (jerk <= 1.001 * np.minimum(arm.limits.jerk, parameters.jerk or np.inf)).all()
+        assert (rate <= 1.005 * parameters.torque_rate_share * arm.limits.torque_rate).all()
+
+
+@pytest.mark.slow
+@settings(max_examples=15, deadline=None)
+@given(
+    seed=st.integers(0, 10**6),
+    spread=st.floats(0.05, 1.5),
+    corners=st.integers(2, 6),
+    jerk=st.sampled_from([None, 500.0, 50.0]),
+    period=st.sampled_from([0.001, 0.004]),
+)
+def test_jerk_and_torque_rate_hold_on_any_path(
+    seed: int, spread: float, corners: int, jerk: float | None, period: float
+) -> None:
+    arm, rng = known_arm("panda"), np.random.default_rng(seed)
+    steps = spread * rng.uniform(-1.0, 1.0, (corners, arm.nv))
+    control = arm.angles(arm.postures["ready"]) + np.repeat(steps, rng.integers(2, 4), axis=0)
+    knots = np.pad(np.linspace(0.0, 1.0, len(control) - 2), 3, mode="edge")
+    path, shares = SmoothPath(knots, control), TimingParameters(jerk=jerk)
+    length = float(np.linalg.norm(np.diff(control, axis=0), axis=1).sum())
+    motion = time_path(arm, path, length, period, shares)
+    require_rates(arm, motion, shares)
+    limits, v = arm.limits, motion.velocity
+    a = np.diff(v, axis=0) / period
+    tau = JointTorques(arm)(motion.position[:-1], v[:-1], a)
+    assert (np.abs(v) <= shares.velocity_share * limits.velocity).all()
+    assert (np.abs(a) <= shares.acceleration_share * limits.acceleration).all()
+    assert (np.abs(tau) <= shares.torque_share * limits.effort).all()
+    np.testing.assert_array_equal(v[[0, -1]], 0.0)
+    np.testing.assert_allclose(motion.position[[0, -1]], control[[0, -1]], atol=1e-12)
+    dense = path(np.linspace(0.0, 1.0, 20001))
+    off = [np.linalg.norm(dense - row, axis=1).min() for row in motion.position[::37]]
+    assert max(off) <= np.linalg.norm(np.diff(dense, axis=0), axis=1).max()
+
+
+def test_rates_cost_little_time(timed: Timed) -> None:
+    arm, path, motion = timed
+    free = time_path(arm, path, 3.0, PERIOD, TimingParameters(), has_rates=False)
+    assert free.duration <= motion.duration <= 1.06 * free.duration
+    if arm.name == "panda":
+        require_rates(arm, motion, TimingParameters())
+        assert rates_used(arm, free, 0.0)[1].max() > 3.0 * arm.limits.torque_rate[0]
+
+
+def test_without_limits_of_rates_nothing_changes() -> None:
+    arm = load_arm("panda", torque_rate=np.inf, jerk=np.inf, shapes="capsule")
+    path = free_path(arm, [[0.0, -0.8, 0.0, -2.4, 0.0, 1.6, 0.8], [1.0, 0.2, 0.3, -1.5, 0.4, 2, 0]])
+    motion = time_path(arm, path, 3.0, PERIOD, TimingParameters())
+    free = time_path(known_arm("panda"), path, 3.0, PERIOD, TimingParameters(), has_rates=False)
+    np.testing.assert_array_equal(motion.knots, free.knots)
+
+
+def test_rates_of_one_joint_alone() -> None:
+    arm = load_arm("two_link", torque_rate=[200.0, 1e9])
+    path = free_path(arm, [[0.0, 0.0], [1.5, -1.0], [3.1, 0.0]])
+    motion = time_path(arm, path, 3.0, PERIOD, TimingParameters())
+    require_rates(arm, motion, TimingParameters())
+    assert rates_used(arm, motion, 0.0)[1][0] > 0.7 * 200.0
+
+
+def test_a_jerk_that_takes_forever_is_refused(timed: Timed) -> None:
+    arm, path, _ = timed
+    with pytest.raises(PlanningError, match=r"more than 1000000 periods .* raise the limits of"):
+        time_path(arm, path, 3.0, PERIOD, TimingParameters(jerk=1e-9))
+    slow = TimingParameters(jerk=20.0)
+    require_rates(arm, time_path(arm, path, 3.0, PERIOD, slow), slow)
 
 
 @pytest.mark.parametrize(
@@ -181,6 +271,15 @@ def test_slows_down_where_it_could_not_stop_and_only_there(bend: Bend) -> None:
     np.testing.assert_allclose(safe.velocity[:300], fast.velocity[:300], atol=0.05)
 
 
+def test_slow_enough_to_stop_and_smooth(bend: Bend) -> None:
+    arm, path, stopping = bend
+    smooth = TimingParameters(jerk=300.0)
+    motion = time_path(arm, path, 4.8, PERIOD, smooth, stopping)
+    require_rates(arm, motion, smooth)
+    q = arm.configurations(motion.position)
+    assert stopping.check(q[::4], motion.velocity[::4]).failing.size == 0
+
+
 def test_no_speed_to_stop_from_where_the_path_touches(bend: Bend) -> None:
     arm, path, _ = bend
     tip = Scene([Sphere(name="ball", radius=0.1, position=(2.0, 0.0, 0.0))])
@@ -190,7 +289,15 @@ def test_no_speed_to_stop_from_where_the_path_touches(bend: Bend) -> None:
     assert raised.value.outcome == Outcome.INFEASIBLE
 
 
-@pytest.mark.parametrize("key", ["velocity_share", "acceleration_share", "torque_share"])
+@pytest.mark.parametrize("value", [0.0, -1.0, np.nan, np.inf])
+def test_jerk_is_checked(value: float) -> None:
+    with pytest.raises(InvalidValueError, match=r"^jerk = .*: must be a finite number > 0"):
+        TimingParameters(jerk=value)
+
+
+@pytest.mark.parametrize(
+    "key", ["velocity_share", "acceleration_share", "torque_share", "torque_rate_share"]
+)
 @pytest.mark.parametrize("value", [0.0, 1.1, np.nan])
 def test_shares_are_checked(key: str, value: float) -> None:
     with pytest.raises(InvalidValueError, match=f"^{key} = "):

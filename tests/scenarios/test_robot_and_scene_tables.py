@@ -3,6 +3,7 @@
 import json
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from densarm.certificates.task import Task
@@ -67,6 +68,18 @@ def test_robot_may_collide_as_drawn(task: Path) -> None:
         arm.model.frames[item.parentFrame].name for item in arm.collision_model.geometryObjects
     }
     assert "base" in links
+
+
+def test_robot_may_have_limits_of_its_own(task: Path) -> None:
+    own = "acceleration = [3, 4]\ntorque_rate = 500\njerk = [20, 30]"
+    task.write_text(TASK.replace('"two_link"', f"'two_link'\n{own}"))
+    limits = load_scenario(task).arm.limits
+    np.testing.assert_array_equal(limits.acceleration, [3.0, 4.0])
+    np.testing.assert_array_equal(limits.torque_rate, [500.0, 500.0])
+    np.testing.assert_array_equal(limits.jerk, [20.0, 30.0])
+    task.write_text(TASK.replace('"two_link"', "'two_link'\njerk = 0"))
+    with pytest.raises(FileContentError, match=r"jerk = 0.0: must be a finite number > 0"):
+        load_scenario(task)
 
 
 def test_a_date_is_refused_by_its_key(task: Path) -> None:

@@ -140,7 +140,7 @@ def test_a_task_that_no_scenario_wrote_is_one_by_default(swing_up: Scenario) -> 
     task = Task(swing_up.arm, swing_up.scene, swing_up.start, swing_up.goal, margin=0.01)
     scenario = Scenario.of_task(task)
     assert scenario.control == ControlParameters(margin=0.01)
-    assert (scenario.gains, scenario.seed, scenario.name) == (Gains(), 0, "run")
+    assert (scenario.gains, scenario.seed, scenario.name) == (None, 0, "run")
 
 
 def test_a_task_without_a_goal_is_no_scenario(swing_up: Scenario) -> None:
@@ -347,7 +347,7 @@ def test_json_that_is_not_a_task() -> None:
     for data in broken:
         with pytest.raises(DensarmError, match="not of format"):
             Task.from_json(data)
-    settings = {"seed", "planning", "timing", "speed", "gains", "input"}
+    settings = {"seed", "planning", "timing", "speed", "gains", "input", "plant", "disturbances"}
     for key in set(whole) - {"format", *settings}:
         with pytest.raises(DensarmError, match=key):
             Task.from_json({k: v for k, v in whole.items() if k != key})

@@ -238,7 +238,8 @@ def test_task_that_is_not_one(tmp_path: Path, content: Content) -> None:
     broken = ["not JSON", "[]", "1", json.dumps({}), json.dumps({**whole, "format": 999})]
     broken += [
         json.dumps({k: v for k, v in whole.items() if k != key})
-        for key in own - {"input"}  # without it torques are meant, as in older files
+        # Without them the arm is its model and told torques, as in older files.
+        for key in own - {"input", "plant", "disturbances"}
     ]
     broken += [
         json.dumps({**whole, key: value})
@@ -298,6 +299,8 @@ def test_summary(swing_up_run: Run) -> None:
         "plan_time_s",
         "preparation_time_s",
         "certified",
+        "plant",
+        "disturbances",
     ]
     assert json.loads(json.dumps(summary)) == summary
     assert summary["outcome"] == "reached"

@@ -2,6 +2,7 @@
 
 import json
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -51,6 +52,24 @@ def test_figures_of_runs() -> None:
     assert data["optimal_ratio"] is None
     assert set(data["sets"]["empty"]) == set(data) - {"problems", "sets"}
     assert set(MEASURES) <= set(data)
+
+
+def test_problems_of_disturbed_arms_in_mujoco(tmp_path: Path) -> None:
+    problems, draw = random_problems("two_link", 2, 0, "none"), {"mass_scale": 0.1, "coulomb": 0.2}
+    noise = {"encoder_noise": 1e-5}
+    results = run_problems(problems, save_dir=tmp_path, plant="mujoco", disturb=noise, draw=draw)
+    told = [result.disturbances for result in results.results]
+    assert {result.plant for result in results.results} == {"mujoco"}
+    assert told[0] != told[1]
+    for one in told:
+        assert one["encoder_noise"] == 1e-5
+        assert all(0.9 < x < 1.1 for x in one["mass_scale"])
+        assert all(0.0 < x < 0.2 for x in one["coulomb"])
+    told_again = run_problems(problems, save_dir=tmp_path, plant="mujoco", disturb=noise, draw=draw)
+    assert told_again.figures() == results.figures()
+    again = run_problems(problems[1:], plant="mujoco", disturb=noise, draw=draw)
+    assert again.results[0].disturbances == told[1]
+    assert again.results[0].duration_s == results.results[1].duration_s
 
 
 def test_figures_of_a_set_are_of_its_own_problems() -> None:

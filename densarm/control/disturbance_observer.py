@@ -1,0 +1,229 @@
+"""DisturbanceObserver: the torque that the model does not explain, and where a delay leads."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from densarm.arms.arm import Arm
+from densarm.values.arrays import Array
+from densarm.values.checks import non_negative
+from densarm.values.documented import documented
+from densarm.values.kernels import compiled, compiled_part
+
+# Rows of the observer's table: the estimate now, and when a torque sent now acts.
+ANGLE, VELOCITY, DISTURBANCE, AHEAD_ANGLE, AHEAD_VELOCITY = 0, 1, 2, 3, 4
+FREE = 5  # the torque sent last, without the gravity then
+_NONLINEAR, _GRAVITY, _INNOVATION, _ACCELERATION, _LARGEST = 6, 7, 8, 9, 10
+N_ROWS = 11
+
+_TRUSTED_SHARE = 0.9  # of the torque limits, that a disturbance may be taken to have
+_LONGEST_STEP = 0.1  # [s] between two calls, after which the observer begins anew
+_MOST_PERIODS = 1000  # of a delay
+
+
+@documented
+@dataclass(frozen=True)
+class ActuationParameters:
+    """How torque reaches the joints, and how far the model of the arm is to be trusted.
+
+    Raises:
+        InvalidValueError: a negative value.
+    """
+
+    delay: float = 0.0
+    """Time until a torque that is sent acts, to the nearest period [s]."""
+    bandwidth: float = 160.0
+    """Poles of the disturbance observer [1/s]; lower where torque is late. Zero for none."""
+    inertia_floor: float = 0.03
+    """D, inertia that feedback reckons with beside the model's, which leaves out gears and rotors
+    [kg·m² or kg]; less where torque is late."""
+
+    def __post_init__(self) -> None:
+        for name in ("delay", "bandwidth", "inertia_floor"):
+            non_negative(name, getattr(self, name))
+
+
+class DisturbanceObserver:
+    r"""Estimates the state and the torque d that acts beside the one that was sent.
+
+    .. math::
+
+        \hat v^- = \hat v + \Delta t\, M^{-1} (\tau + \hat d - H), \quad r = v - \hat v^-, \quad
+        \hat v = \hat v^- + (1 - \lambda^2)\, r, \quad
+        \hat d \mathrel{+}= \frac{(1 - \lambda)^2}{\Delta t} M r
+
+    τ is what acted since the last call, which a delay makes an older one; λ = exp(-L Δt), so that
+    both poles are at L, the bandwidth. The state when a torque sent now acts is predicted by those
+    on their way. It begins anew where time runs back or jumps.
+
+    Args:
+        arm: the arm.
+        period: time between two calls, if they come in time [s].
+        parameters: the delay and L.
+
+    Attributes:
+        rows: table of the estimates (N, nv), of which the first `N_ROWS` are the observer's.
+        sent: torques that were sent, the last row for the one to come (N, nv) [N·m or N].
+
+    Source: J. Han, From PID to active disturbance rejection control, IEEE TIE 2009, section IV, in
+        discrete time as by G. Franklin et al., Digital Control of Dynamic Systems, ch. 8.
+    """
+
+    def __init__(
+        self, arm: Arm, period: float, parameters: ActuationParameters, rows: Array
+    ) -> None:
+        late = min(math.ceil(parameters.delay / period), _MOST_PERIODS)
+        self.parameters = parameters
+        self.rows = rows
+        self.rows[_LARGEST] = _TRUSTED_SHARE * arm.limits.effort
+        self.sent: Array = np.zeros((late + 2, arm.nv))
+        self._joint_index: NDArray[np.int64] = arm.joint_index
+        self._factor = np.zeros((arm.nv, arm.nv))
+        self._numbers = np.array([0.0, parameters.bandwidth, parameters.delay])
+        self._time = math.nan
+
+    def begins(self, t: float) -> bool:
+        """Return whether it begins anew at a time [s]."""
+        return not 0.0 <= t - self._time <= _LONGEST_STEP
+
+    def update(
+        self, t: float, q: Array, v: Array, mass: Array, nonlinear: Array, gravity: Array
+    ) -> float:
+        """Take a measured state in, and return the time since the last one [s].
+
+        It is zero where the observer begins: no disturbance is known then, and the arm is held.
+
+        Args:
+            t: when [s]; NaN to begin anew.
+            q: configuration (nq,).
+            v: velocity (nv,).
+            mass: M there, upper triangle (nv, nv).
+            nonlinear: H there (nv,) [N·m or N].
+            gravity: gravity there (nv,) [N·m or N].
+        """
+        elapsed = -1.0 if self.begins(t) else t - self._time
+        self._time = t
+        self._numbers[0] = elapsed
+        _observe(
+            q,
+            v,
+            self._numbers,
+            self._joint_index,
+            mass,
+            nonlinear,
+            gravity,
+            self.rows,
+            self.sent,
+            self._factor,
+        )
+        return max(elapsed, 0.0)
+
+    def take_over(self, other: "DisturbanceObserver") -> None:
+        """Go on from another's estimates and torques, of the same arm."""
+        self._time = other._time
+        self.rows[:_LARGEST] = other.rows[:_LARGEST]
+        n = min(len(self.sent), len(other.sent))
+        self.sent[-n:] = other.sent[-n:]
+
+
+@compiled
+def _observe(  # noqa: C901  # one kernel, since every call has its cost
+    q: Array,
+    v: Array,
+    numbers: Array,
+    joint_index: NDArray[np.int64],
+    mass: Array,
+    nonlinear: Array,
+    gravity: Array,
+    rows: Array,
+    sent: Array,
+    factor: Array,
+) -> None:
+    dt, delay, size, nv = numbers[0], numbers[2], sent.shape[0], v.size
+    angle, velocity, disturbance = rows[ANGLE], rows[VELOCITY], rows[DISTURBANCE]
+    acceleration, innovation = rows[_ACCELERATION], rows[_INNOVATION]
+    if dt < 0.0:
+        for i in range(nv):
+            angle[i], velocity[i], disturbance[i] = _position(q, joint_index, i), v[i], 0.0
+            rows[AHEAD_ANGLE, i], rows[AHEAD_VELOCITY, i] = angle[i], velocity[i]
+            rows[_NONLINEAR, i] = nonlinear[i]
+            for k in range(size):
+                sent[k, i] = gravity[i]
+            rows[_GRAVITY, i], rows[FREE, i] = gravity[i], 0.0
+        return
+    if dt == 0.0:
+        return
+    acting = size - 1 - min(int(delay / dt + 0.5), size - 1)
+    pole = math.exp(-min(numbers[1], 1.0 / (dt + delay)) * dt)
+    keep, learn = 1.0 - pole * pole, (1.0 - pole) * (1.0 - pole) / dt
+    if numbers[1] == 0.0:
+        keep, learn = 1.0, 0.0
+    _factorise(mass, factor)
+    for i in range(nv):
+        acceleration[i] = sent[acting, i] + disturbance[i] - rows[_NONLINEAR, i]
+    _solve(factor, acceleration)
+    for i in range(nv):
+        predicted = velocity[i] + dt * acceleration[i]
+        innovation[i] = v[i] - predicted
+        velocity[i] = predicted + keep * innovation[i]
+        angle[i] += dt * predicted
+        off = _position(q, joint_index, i) - angle[i]
+        if joint_index[1, i]:
+            off -= 2.0 * math.pi * math.floor(off / (2.0 * math.pi) + 0.5)
+        angle[i] += keep * off
+    for i in range(nv):
+        momentum = 0.0
+        for j in range(nv):
+            momentum += (mass[i, j] if i <= j else mass[j, i]) * innovation[j]
+        most, found = rows[_LARGEST, i], disturbance[i] + learn * momentum
+        disturbance[i] = most if found > most else -most if found < -most else found
+        rows[AHEAD_ANGLE, i], rows[AHEAD_VELOCITY, i] = angle[i], velocity[i]
+        rows[_NONLINEAR, i] = nonlinear[i]
+        rows[FREE, i], rows[_GRAVITY, i] = sent[size - 1, i] - rows[_GRAVITY, i], gravity[i]
+    for k in range(acting + 1, size):
+        for i in range(nv):
+            acceleration[i] = sent[k, i] + disturbance[i] - nonlinear[i]
+        _solve(factor, acceleration)
+        for i in range(nv):
+            rows[AHEAD_ANGLE, i] += dt * (rows[AHEAD_VELOCITY, i] + 0.5 * dt * acceleration[i])
+            rows[AHEAD_VELOCITY, i] += dt * acceleration[i]
+    for k in range(size - 1):
+        for i in range(nv):
+            sent[k, i] = sent[k + 1, i]
+
+
+@compiled_part
+def _position(q: Array, joint_index: NDArray[np.int64], i: int) -> float:
+    k = joint_index[0, i]
+    return math.atan2(q[k + 1], q[k]) if joint_index[1, i] else q[k]
+
+
+@compiled_part
+def _factorise(mass: Array, factor: Array) -> None:
+    """Write the Cholesky factor L of M (nv, nv), of which the upper triangle is read."""
+    for j in range(mass.shape[0]):
+        square = mass[j, j]
+        for k in range(j):
+            square -= factor[j, k] * factor[j, k]
+        factor[j, j] = math.sqrt(square)
+        for i in range(j + 1, mass.shape[0]):
+            entry = mass[j, i]
+            for k in range(j):
+                entry -= factor[i, k] * factor[j, k]
+            factor[i, j] = entry / factor[j, j]
+
+
+@compiled_part
+def _solve(factor: Array, x: Array) -> None:
+    """Replace x (nv,) by M⁻¹ x."""
+    n = x.shape[0]
+    for i in range(n):
+        for k in range(i):
+            x[i] -= factor[i, k] * x[k]
+        x[i] /= factor[i, i]
+    for i in range(n - 1, -1, -1):
+        for k in range(i + 1, n):
+            x[i] -= factor[k, i] * x[k]
+        x[i] /= factor[i, i]
