@@ -42,6 +42,9 @@ from .scenarios.scenario import load_scenario as load_scenario
 from .scene.loading import load_problems as load_problems
 from .scene.loading import load_scene as load_scene
 from .scene.mesh import Mesh as Mesh
+from .scene.motion import BackAndForth as BackAndForth
+from .scene.motion import ConstantVelocity as ConstantVelocity
+from .scene.motion import Waypoints as Waypoints
 from .scene.obstacles import Box as Box
 from .scene.obstacles import Capsule as Capsule
 from .scene.obstacles import Cylinder as Cylinder

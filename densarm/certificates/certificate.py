@@ -66,9 +66,11 @@ def certify(task: Task, time: Array, q: Array, v: Array, tau: Array) -> Certific
 
     The parts: swept check of the whole motion against the scene and the arm itself, start and
     goal, limits of position, velocity, acceleration and torque, one-step replay of the dynamics,
-    and a clear stopping trajectory within the limits from every sample. Torque limits do not apply
-    to commanded velocities, nor to an arm without masses, whose dynamics nothing can replay; nor is
-    a plant replayed that is disturbed, or MuJoCo's.
+    and a clear stopping trajectory within the limits from every sample. Obstacles with a motion
+    are where it has them at each time, between samples too; stopping is proved until the arm
+    is at rest, not that nothing runs into it afterwards. Torque limits do not apply to commanded
+    velocities, nor to an arm without masses, whose dynamics nothing can replay; nor is a plant
+    replayed that is disturbed, or MuJoCo's.
     """
     world = World(task.arm, task.scene)
     return Certificate(
@@ -87,12 +89,14 @@ def swept_result(world: World, q: Array, v: Array, dt: float) -> SweptResult:
     """Return the swept check of a motion recorded each dt [s], q (N, nq) and v (N, nv).
 
     Between samples the true motion departs from the chord by at most a Δt²/8, a the largest
-    acceleration of the step and its neighbours.
+    acceleration of the step and its neighbours. Obstacles with a motion are where it has them.
     """
     acceleration = np.abs(np.diff(v, axis=0)) / dt
     k = np.arange(len(acceleration))
     around = np.max([acceleration[np.clip(k + by, 0, len(k) - 1)] for by in (-1, 0, 1)], axis=0)
-    return SweptCheck(world).check(q, around * dt**2 / 8.0)
+    return SweptCheck(world).check(
+        q, around * dt**2 / 8.0, dt * np.arange(len(q), dtype=np.float64)
+    )
 
 
 def replay_errors(task: Task, q: Array, v: Array, tau: Array) -> Array:
@@ -225,7 +229,10 @@ def _replay(task: Task, q: Array, v: Array, tau: Array) -> Check:
 
 def _stopping(task: Task, world: World, q: Array, v: Array) -> Check:
     arm, dt = task.arm, task.simulation.dt
-    result = StoppingCheck(world, StoppingTrajectory(arm)).check(q, v)
+    moves = world.fastest_obstacle > 0.0
+    world.set_time(0.0)
+    time = dt * np.arange(len(q), dtype=np.float64) if moves else None
+    result = StoppingCheck(world, StoppingTrajectory(arm)).check(q, v, time)
     failing = result.failing
     if failing.size:
         first = int(failing[0])
@@ -238,12 +245,15 @@ def _stopping(task: Task, world: World, q: Array, v: Array) -> Check:
         return Check("stopping", False, detail, None, first * dt)
     looked_at = np.arange(0, len(q), 1 + len(q) // _RESTS)
     ends = arm.configurations(result.end[looked_at])
-    rest = smallest_distances(world, ends)
+    ended = None if time is None else (time + result.duration)[looked_at]
+    rest = smallest_distances(world, ends, ended)
     at, longest = float(looked_at[rest.argmin()] * dt), int(np.argmax(result.duration))
     detail = (
         f"proved clear from {len(q)} samples, longest stop {result.duration[longest]:.2g} s at "
         f"t = {longest * dt:.3f} s, {_nearest(rest.min(), at)} of {len(ends)} ends"
     )
+    if moves:
+        detail += "; until at rest, obstacles moving on"
     if arm.links_without_mass:
         detail += "; by acceleration limits alone"
     elif set(task.disturbances) - _OF_SENSORS:

@@ -127,6 +127,8 @@ class DensityRegulation(FieldRegulation):
     that metric too both lead straight from sub-goal to sub-goal, and differ where obstacles are
     sensed.
 
+    Obstacles may move meanwhile: they act where they are, and how fast they come is not looked at.
+
     Args:
         world: the arm among obstacles.
         goal: configuration (nq,).

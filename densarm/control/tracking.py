@@ -66,7 +66,8 @@ class DensityTracking:
     φ, which asks for no more than the torque rate can follow, and each joint saturates by itself.
     The attraction is at most K_v times the velocity limit, so that no push is answered by a return
     faster than that. Every sensing distance is below what the motion keeps from the unsafe set, so
-    that Ψ = 1 on it and obstacles act only on an arm that was pushed off it. The torque is taken to
+    that Ψ = 1 on it and obstacles act only on an arm that was pushed off it; those that move, of
+    which the motion knows nothing, act from the largest sensing distance on. The torque is taken to
     be held for the motion's period: q̈_d is its mean over that time. State and reference are those
     of the time when it acts.
 
@@ -267,7 +268,7 @@ def _sensed_off(
     joint_sensing = np.clip(sensing.path_share * inside, _SMALLEST, sensing.joint)
     pairs = ActivePairs(world, kinematics)
     return (
-        ClearanceSet(world, motion.margin, pair_sensing, pairs),
+        ClearanceSet(world, motion.margin, pair_sensing, pairs, sensing.distance),
         JointLimitSet(arm, joint_sensing),
     )
 

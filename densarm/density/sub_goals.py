@@ -79,6 +79,8 @@ class SubGoals:
     def __init__(self, check: SweptCheck, path: GuidePath, sensing: SensingParameters) -> None:
         arm = check.arm
         self._check = check
+        self.sensing = sensing
+        """As given."""
         self.q: Array = _refined(check, path) if path.is_clear else path.waypoints
         self.distance_margin: Array = np.array([check.distance_margin(q) for q in self.q])
         """Distance of each pair beyond the margin at each sub-goal (W, K) [m]."""
@@ -156,8 +158,12 @@ class GuidedDensity:
         self.world = check.world
         self.sub_goals = sub_goals
         self._version = self.world.version
-        sensing = sub_goals.sensing_distance[sub_goals.current]
-        self._clearance_set = ClearanceSet(self.world, check.margin, sensing)
+        self._clearance_set = ClearanceSet(
+            self.world,
+            check.margin,
+            sub_goals.sensing_distance[sub_goals.current],
+            moving=sub_goals.sensing.distance,
+        )
         self._limits = JointLimitSet(check.arm, sub_goals.joint_sensing_distance)
         self.density = NavigationDensity(
             check.arm,
@@ -189,10 +195,9 @@ class GuidedDensity:
     def update(self, q: Array) -> None:
         """Move on to the farthest sub-goal in sight of q (nq,) and evaluate its density there.
 
-        Raises:
-            SceneChangedError: obstacles have changed since the sub-goals were proved.
+        Where obstacles have changed since the sub-goals were proved, these lead as before, and
+        the density keeps off the obstacles as they are.
         """
-        self.world.require_version(self._version)
         self.density.update(q)
         self.advance(q)
 
@@ -206,7 +211,11 @@ class GuidedDensity:
         """Return the sub-goal (nq,) if Ψ = 1 on the segment to it from q (nq,), which was updated.
 
         There ρ depends on V alone, and grows along the segment.
+
+        Raises:
+            SceneChangedError: obstacles have changed since the sub-goals were proved.
         """
+        self.world.require_version(self._version)
         goals = self.sub_goals
         if self.density.log_psi < 0.0 or not goals.is_in_sight(goals.current, q, self.distances):
             return None

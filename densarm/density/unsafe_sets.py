@@ -100,6 +100,8 @@ class ClearanceSet:
         margin: m ≥ 0 [m].
         sensing_distance: σ > 0 [m], one for all pairs or shape (K,).
         pairs: which of them are near, for this set alone; None for active pairs of its own.
+        moving: σ [m] of pairs whose obstacle has a motion, or has been moved since this set was
+            made; None for those of all pairs.
 
     Attributes:
         pairs: the active pairs, updated to the last configuration.
@@ -114,22 +116,34 @@ class ClearanceSet:
         margin: float,
         sensing_distance: ArrayLike,
         pairs: ActivePairs | None = None,
+        moving: float | None = None,
     ) -> None:
         self.world = world
+        self._moving, self._version = moving, world.version
+        self._n_moving, self._way_before = -1, world.obstacle_way.copy()
         self.pairs = pairs or ActivePairs(world)
         self.margin = non_negative("margin", margin)
         self.sensing_distance = positive_array("sensing_distance", sensing_distance, world.n_pairs)
         """σ_k (K,) [m], to be changed by `set_sensing_distance`."""
+        self._standing = self.sensing_distance.copy()
         self.set_sensing_distance(self.sensing_distance)
 
     def set_sensing_distance(self, sensing_distance: Array) -> None:
         """Sense the pairs at other distances from now on, σ > 0 (K,) [m]."""
-        self.sensing_distance[:] = sensing_distance
+        self.sensing_distance[:] = self._standing[:] = sensing_distance
+        if self._moving is not None:
+            is_moving = self._is_moving()
+            self._n_moving = int(np.count_nonzero(is_moving))
+            self.sensing_distance[is_moving] = self._moving
         np.add(self.margin, self.sensing_distance, out=self.pairs.reach)
 
     def add_log_bump(self, q: Array, theta: float, out_gradient: Array) -> float:
         """Act as `UnsafeSet.add_log_bump`."""
         pairs = self.pairs
+        if self._version != self.world.version and self._moving is not None:
+            self._version = self.world.version
+            if np.count_nonzero(self._is_moving()) != self._n_moving:
+                self.set_sensing_distance(self._standing)
         pairs.update(q)
         return _add_active_log_bumps(
             pairs.state,
@@ -141,6 +155,10 @@ class ClearanceSet:
             theta,
             out_gradient,
         )
+
+    def _is_moving(self) -> NDArray[np.bool_]:
+        world = self.world
+        return np.asarray((world.obstacle_way != self._way_before) | world.has_motion)
 
     def add_curvature(self, q: Array, theta: float, out: Array) -> None:  # noqa: ARG002
         """Act as `Curved.add_curvature`."""

@@ -104,6 +104,7 @@ def run_by(
     began = time.perf_counter()
     world, task = scenario.world, scenario.task
     on_progress("planning")
+    world.set_time(0.0)
     try:
         drive = baseline(scenario)
     except PlanningError as error:
@@ -220,12 +221,16 @@ def records(run: Run) -> tuple[EnergyRecord, RantzerRecord]:
     """Return what is recorded of a run's energy and of Rantzer's condition along it.
 
     Args:
-        run: its density is the plain one of the goal; nothing is recorded without a goal.
+        run: its density is the plain one of the goal; nothing is recorded without a goal, or
+            among obstacles that move.
     """
     if run.task.goal is None:
         return no_energy("no goal was given"), RantzerRecord(str(run.task.density.gauge))
     scenario = Scenario.of_task(run.task)
     world, control = scenario.world, scenario.control
+    if world.fastest_obstacle > 0.0:
+        reason = "obstacles move, and U with them"
+        return no_energy(reason), RantzerRecord(str(run.task.density.gauge))
     goal = inside_limits(SweptCheck(world, control.margin), scenario.goal)
     is_plain = control.form == ControlForm.PLAIN
     density = density_towards(

@@ -1,8 +1,9 @@
-"""Obstacles: named bodies at fixed poses, as frozen values."""
+"""Obstacles: named bodies, at a pose or in motion, as frozen values."""
 
 import math
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, ClassVar
 
 import coal
@@ -11,8 +12,15 @@ import pinocchio as pin
 from numpy.typing import ArrayLike
 
 from densarm.errors import DensarmError, InvalidValueError
-from densarm.scene.shapes import FARTHEST, LARGEST, box_hull, circumscribed_cylinder
-from densarm.values.arrays import Vector
+from densarm.scene.motion import FASTEST, ObstacleMotion, near_position
+from densarm.scene.shapes import (
+    FARTHEST,
+    LARGEST,
+    box_hull,
+    circumscribed_cylinder,
+    extreme_points,
+)
+from densarm.values.arrays import Array, Vector
 from densarm.values.checks import (
     finite_number,
     finite_tuple,
@@ -22,15 +30,18 @@ from densarm.values.checks import (
 )
 from densarm.values.documented import documented
 
+_SAME_POSE = 1e-9  # [m], and of rotation matrices
+
 
 @dataclass(frozen=True, kw_only=True)
 class Obstacle(ABC):
-    """A named body at a fixed pose, the union of convex shapes. Its vectors are kept as tuples.
+    """A named body at a pose, the union of convex shapes. Its vectors are kept as tuples.
 
     Raises:
         InvalidValueError: no name, a number that is not finite, no unit quaternion, a position
             1000 km away, or, of any kind of obstacle, a size that is not positive, above 1 km, or
-            next to nothing beside another.
+            next to nothing beside another; a motion faster than 100 m/s or rad/s, or one that is
+            elsewhere at time zero than a pose that is given.
     """
 
     _SIZES: ClassVar[tuple[str, ...]] = ()
@@ -42,25 +53,76 @@ class Obstacle(ABC):
     """Origin of the body's frame in the world, or in the frame of the link that holds it [m]."""
     orientation_xyzw: Vector = (0.0, 0.0, 0.0, 1.0)
     """Unit quaternion x y z w of that frame."""
+    motion: ObstacleMotion | None = None
+    """How it moves on from its pose, which is that at time zero; None if it stands."""
 
     def __post_init__(self) -> None:
         name = self.name
         if not isinstance(name, str) or not name:
             raise InvalidValueError("obstacle name", name, "a non-empty string")
         quaternion = unit_quaternion(f"{name}.orientation_xyzw", self.orientation_xyzw)
-        position = finite_tuple(f"{name}.position", self.position, 3)
-        if not max(map(abs, position)) < FARTHEST:
-            raise InvalidValueError(f"{name}.position", position, "less than 1000 km away")
+        position = near_position(f"{name}.position", self.position)
         self._store(position=position, orientation_xyzw=quaternion)
         for key in self._SIZES:
             size = positive(f"{name}.{key}", getattr(self, key))
             if size > LARGEST:
                 raise InvalidValueError(f"{name}.{key}", size, f"at most {LARGEST:g} m")
             self._store(**{key: size})
+        if self.motion is not None:
+            self._begin(self.motion)
+
+    @cached_property
+    def reach(self) -> float:
+        """Largest distance of a point of it from its frame's origin [m]."""
+        ends = [extreme_points(shape) for shape in self.convex_shapes()]
+        return max(float(np.linalg.norm(x, axis=1).max()) + radius for x, radius in ends)
+
+    def pose_at(self, time: float) -> pin.SE3:
+        """Return the pose of its frame at a time [s]."""
+        own = obstacle_pose(self)
+        return own if self.motion is None else self.motion.pose(time, own)
+
+    def velocity_at(self, time: float) -> Array:
+        """Return the velocity of its frame's origin [m/s] and of its turning [rad/s] (6,)."""
+        return (
+            np.zeros(6) if self.motion is None else self.motion.velocity(time, obstacle_pose(self))
+        )
+
+    def speed_bound(self, begin: float, end: float) -> float:
+        """Return a bound on the speed of all its points between two times [m/s]."""
+        if self.motion is None:
+            return 0.0
+        linear, angular = self.motion.speed_bounds(begin, end, obstacle_pose(self))
+        return linear + (
+            angular * (self.reach + math.hypot(*self.motion.pivot)) if angular else 0.0
+        )
 
     @abstractmethod
     def convex_shapes(self) -> tuple[coal.CollisionGeometry, ...]:
         """Return the shapes, in the body's frame, whose distances coal differentiates."""
+
+    def _begin(self, motion: ObstacleMotion) -> None:
+        """Check a motion, and take its pose at time zero."""
+        name, own = f"{self.name}.motion", obstacle_pose(self)
+        if not isinstance(motion, ObstacleMotion):
+            raise InvalidValueError(name, motion, "an ObstacleMotion")
+        bounds = (
+            *motion.speed_bounds(-math.inf, math.inf, own),
+            self.speed_bound(-math.inf, math.inf),
+        )
+        for speed, unit in zip(bounds, ("m/s", "rad/s", "m/s everywhere"), strict=True):
+            if not speed <= FASTEST:
+                raise InvalidValueError(f"{name} [{unit}]", speed, f"at most {FASTEST:g}")
+        begun = motion.pose(0.0, own)
+        if begun.isApprox(own, _SAME_POSE):
+            return
+        values = pin.SE3ToXYZQUAT(begun).tolist()
+        for key, value in (("position", values[:3]), ("orientation_xyzw", values[3:])):
+            given = getattr(self, key)
+            is_other = not np.allclose(given, value, rtol=0.0, atol=_SAME_POSE)
+            if is_other and given != getattr(Obstacle, key) and key == "position":
+                raise InvalidValueError(f"{self.name}.{key}", given, f"left out, or {value}")
+            self._store(**{key: tuple(value)})
 
     def _require_hull(self, key: str, sizes: tuple[float, ...]) -> None:
         """Refuse by its name what is too thin or too large for a hull."""
@@ -179,6 +241,11 @@ class HalfSpace(Obstacle):
         if not abs(offset) < FARTHEST:
             raise InvalidValueError(f"{self.name}.offset", offset, "less than 1000 km away")
         self._store(normal=tuple(unit.tolist()), offset=offset)
+
+    @cached_property
+    def reach(self) -> float:
+        """Infinite."""
+        return math.inf
 
     def convex_shapes(self) -> tuple[coal.CollisionGeometry, ...]:
         """Return coal's half-space."""

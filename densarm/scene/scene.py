@@ -3,13 +3,16 @@
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import MISSING, asdict, dataclass, fields
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from densarm.errors import InvalidValueError, UnknownNameError
 from densarm.scene.mesh import Mesh
+from densarm.scene.motion import MOTION_TYPES, ObstacleMotion
 from densarm.scene.obstacles import Box, Capsule, Cylinder, HalfSpace, Obstacle, Sphere
 from densarm.values.checks import non_negative
 from densarm.values.documented import documented
+
+_Kind = TypeVar("_Kind", Obstacle, ObstacleMotion)
 
 OBSTACLE_TYPES: Mapping[str, type[Obstacle]] = {
     "sphere": Sphere,
@@ -48,6 +51,8 @@ class Attachment:
         kinds = [kind for kind in OBSTACLE_TYPES.values() if kind is not HalfSpace]
         _require_kind("attached body", self.body, kinds)
         name, links = self.body.name, self.touch_links
+        if self.body.motion is not None:
+            raise InvalidValueError(f"{name}.motion", self.body.motion, "none: its link moves it")
         if not isinstance(links, tuple | list) or not all(isinstance(x, str) for x in links):
             raise InvalidValueError(f"{name}.touch_links", links, "a list of names of links")
         if not isinstance(self.link, str):
@@ -84,7 +89,7 @@ class Scene:
     """
 
     obstacles: tuple[Obstacle, ...] = ()
-    """What stands still."""
+    """What does not belong to the arm."""
     attachments: tuple[Attachment, ...] = ()
     """What links hold."""
 
@@ -138,8 +143,12 @@ class Scene:
 
 def obstacle_table(obstacle: Obstacle) -> dict[str, Any]:
     """Return an obstacle as plain data; `parse_obstacle` is its inverse."""
-    words = {kind: word for word, kind in OBSTACLE_TYPES.items()}
-    return {"type": words[type(obstacle)], **asdict(obstacle)}
+    table = {"type": _word(obstacle, OBSTACLE_TYPES), **asdict(obstacle)}
+    if obstacle.motion is None:
+        del table["motion"]
+    else:
+        table["motion"] = {"type": _word(obstacle.motion, MOTION_TYPES), **table["motion"]}
+    return table
 
 
 def parse_obstacle(table: Mapping[str, Any], folder: Path | None = None) -> Obstacle:
@@ -150,22 +159,45 @@ def parse_obstacle(table: Mapping[str, Any], folder: Path | None = None) -> Obst
         InvalidValueError: a missing field, or a value that is not allowed.
         FileContentError: a mesh file, its path relative to the folder, that cannot be used.
     """
+    name = f"obstacle {table.get('name', '?')}"
+    kind, values = _kind_and_fields(name, table, OBSTACLE_TYPES)
+    if values.get("motion") is not None:
+        values["motion"] = _parse_motion(name, values["motion"])
+    if folder is not None and values.get("path"):
+        values["path"] = str(folder / str(values["path"]))
+    return kind(**values)
+
+
+def _parse_motion(name: str, table: Any) -> ObstacleMotion:
+    if not isinstance(table, Mapping):
+        raise InvalidValueError(f"{name}.motion", table, "a table with the key 'type'")
+    kind, values = _kind_and_fields(f"{name}.motion", table, MOTION_TYPES)
+    try:
+        return kind(**values)
+    except InvalidValueError as error:
+        raise InvalidValueError(f"{name}.{error.name}", error.value, error.allowed) from None
+
+
+def _kind_and_fields(
+    name: str, table: Mapping[str, Any], kinds: Mapping[str, type[_Kind]]
+) -> tuple[type[_Kind], dict[str, Any]]:
+    """Return the dataclass that a table's type stands for, and what the table gives of it."""
     values = dict(table)
     word = values.pop("type", None)
-    name = f"obstacle {values.get('name', '?')}"
-    if not isinstance(word, str) or word not in OBSTACLE_TYPES:
-        raise UnknownNameError(f"type of {name}", word, OBSTACLE_TYPES)
-    kind = OBSTACLE_TYPES[word]
-    known = {item.name: item.default is MISSING for item in fields(kind)}
+    if not isinstance(word, str) or word not in kinds:
+        raise UnknownNameError(f"type of {name}", word, kinds)
+    known = {item.name: item.default is MISSING for item in fields(kinds[word])}
     for key in values:
         if key not in known:
             raise UnknownNameError(f"key of {name} ({word})", key, known)
     for key, required in known.items():
         if required and key not in values:
             raise InvalidValueError(f"{name}.{key}", None, f"given for a {word}")
-    if folder is not None and values.get("path"):
-        values["path"] = str(folder / str(values["path"]))
-    return kind(**values)
+    return kinds[word], values
+
+
+def _word(value: object, kinds: Mapping[str, type[Any]]) -> str:
+    return {kind: word for word, kind in kinds.items()}[type(value)]
 
 
 def _require_kind(name: str, body: object, kinds: Iterable[type[Obstacle]]) -> None:

@@ -51,11 +51,12 @@ def simulate(
     """Run a controller in a closed loop from rest, until it ends.
 
     It ends where the arm has held the goal, where it touches something, where it rests away from
-    the goal for too long, or when the time is up. A goal is taken to be the controller's own
+    the goal for too long, or when the time is up. Obstacles with a motion move along, from time
+    zero on; the world is left as it is in the end. A goal is taken to be the controller's own
     attribute `goal`; without any the run ends by contact or time.
 
     Args:
-        world: the arm among obstacles, as they are now.
+        world: the arm among obstacles, as they are now, or in motion.
         controller: called at each control period, with the time since the run began. Its
             attributes `goal`, `motion`, `is_moving`, `tracking_error`, `remark` and
             `describe_stall`, if any, tell what it wants, how long it moves, and why it rests.
@@ -139,6 +140,7 @@ def simulate_task(
     if not callable(getattr(controller, task.input, None)):
         allowed = f"one with a method {task.input}(t, q, v), which this plant needs"
         raise InvalidValueError("controller", type(controller).__name__, allowed)
+    world.set_time(0.0)
     if fault := infeasibility(SweptCheck(world, task.margin), {"start": task.start}):
         return Run.at_rest(task, world, Outcome.INFEASIBLE, fault)
     signals = Signals(told, world.arm, parameters.dt)
@@ -177,6 +179,7 @@ class _Loop:
                 if error is not None:
                     tracking_error = max(float(error), tracking_error or 0.0)
             q, v = self.plant.step(q, self.signals.pushed(k * p.dt, v), self.signals.acting(u))
+            self.world.set_time((k + 1) * p.dt)
             inputs.append(u)
             if touching := self._record(q, v):
                 outcome, detail = Outcome.COLLIDED, f"{touching} at t = {(k + 1) * p.dt:.3f} s"

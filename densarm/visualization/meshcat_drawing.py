@@ -136,16 +136,19 @@ def _place_camera(viewer: meshcat.Visualizer, scene: RenderScene) -> None:
 
 
 def _animation(viewer: meshcat.Visualizer, scene: RenderScene) -> meshcat.animation.Animation:
-    """Return the motion of the joints for meshcat's time line, which counts seconds."""
+    """Return the motion of joints and obstacles for meshcat's time line, which counts seconds."""
     poses = np.array([[pin.SE3ToXYZQUAT(pose) for pose in scene.joint_poses(q)] for q in scene.q])
     seconds = scene.time.tolist()
     animation = meshcat.animation.Animation()
-    for joint, name in list(enumerate(scene.joints))[1:]:
-        tracks = {
-            "position": ("vector3", poses[:, joint, :3]),
-            "quaternion": ("quaternion", poses[:, joint, 3:]),
-        }
-        animation.clips[viewer["robot"][name].path] = meshcat.animation.AnimationClip(
+    moving = [
+        (viewer["robot"][name], poses[:, joint]) for joint, name in enumerate(scene.joints) if joint
+    ]
+    for name, placements in scene.obstacle_poses.items():
+        rows = np.array([pin.SE3ToXYZQUAT(pose) for pose in placements])
+        moving += [(viewer[group][name], rows) for group in ("obstacles", "sensing")]
+    for node, rows in moving:
+        tracks = {"position": ("vector3", rows[:, :3]), "quaternion": ("quaternion", rows[:, 3:])}
+        animation.clips[node.path] = meshcat.animation.AnimationClip(
             {
                 key: meshcat.animation.AnimationTrack(key, kind, seconds, values.tolist())
                 for key, (kind, values) in tracks.items()

@@ -110,9 +110,10 @@ class Picture:
         self._raster = Rasterizer(scene.camera, width, height)
         self._line_scale = width / 1280.0
         self._caption = Caption(scene, width, height)
-        self._obstacles = [
-            _painted(body.mesh, body.placement.homogeneous, body.color) for body in scene.obstacles
-        ]
+        self._standing = {
+            body.name: _painted(body.mesh, body.placement.homogeneous, body.color)
+            for body in scene.obstacles
+        }
         goal = scene.run.task.goal
         self._goal = None if goal is None else self._posed(goal, palette.GOAL)
 
@@ -120,16 +121,16 @@ class Picture:
         """Return the picture of frame k."""
         scene, raster = self._scene, self._raster
         raster.clear()
-        robot = self._posed(scene.q[k])
+        robot, obstacles = self._posed(scene.q[k]), self._obstacles(k)
         raster.lines(scene.floor, palette.FLOOR, _FLOOR_WIDTH * self._line_scale, 1.0)
-        shadow = _shadow([robot, *self._obstacles], scene.floor[0, 0, 2])
+        shadow = _shadow([robot, *obstacles], scene.floor[0, 0, 2])
         raster.fill(shadow, _SHADOW_OPACITY)
         raster.fill(robot)
         if scene.path is not None:
             raster.fill(_unlit(scene.path))
         for mesh, transforms in scene.closest_line.values():
             raster.fill(_unlit(_painted(mesh, transforms[k], palette.CLOSEST)))
-        self._draw_translucent()
+        self._draw_translucent(obstacles)
         image = Image.fromarray(raster.pixels())
         label = raster.position(scene.closest[k].points[1]) if scene.closest else None
         self._caption.write(image, k, label)
@@ -146,10 +147,19 @@ class Picture:
             ]
         )
 
-    def _draw_translucent(self) -> None:
+    def _obstacles(self, k: int) -> list[TriangleMesh]:
+        """Return the obstacles where they are at frame k."""
+        now = {
+            body.name: _painted(body.mesh, poses[k].homogeneous, body.color)
+            for body in self._scene.obstacles
+            if (poses := self._scene.obstacle_poses.get(body.name))
+        }
+        return list((self._standing | now).values())
+
+    def _draw_translucent(self, obstacles: list[TriangleMesh]) -> None:
         """Draw goal and obstacles from the farthest to the nearest."""
         eye = self._scene.camera.target + self._scene.camera.offset
-        meshes = [mesh for mesh in (*self._obstacles, self._goal) if mesh is not None]
+        meshes = [mesh for mesh in (*obstacles, self._goal) if mesh is not None]
         away = [np.linalg.norm(mesh.vertices.mean(axis=0) - eye) for mesh in meshes]
         for k in np.argsort(away)[::-1]:
             if meshes[k] is self._goal:

@@ -82,7 +82,7 @@ def run_figure(run: Run) -> Figure:
             figure.subfigures(1, 2, width_ratios=[width, _SPACE_WIDTH], squeeze=False)
         )
         _plot_joint_space(space.subplots(), run, world, density)
-    _plot_over_time(over_time, heights, run, density)
+    _plot_over_time(over_time, heights, run, world, density)
     return figure
 
 
@@ -95,6 +95,7 @@ def _plot_over_time(
     figure: Figure | SubFigure,
     heights: list[float],
     run: Run,
+    world: World,
     density: NavigationDensity | None,
 ) -> None:
     nv = run.task.arm.nv
@@ -110,7 +111,7 @@ def _plot_over_time(
     if density is not None:
         last.tick_params(labelbottom=False)
         last = figure.add_subplot(grid[nv + 1, :], sharex=first)
-        _plot_density(last, run, density)
+        _plot_density(last, run, world, density)
     last.set_xlabel("time [s]")
     figure.align_ylabels()
     first.set_xlim(run.time[0], max(run.time[-1], run.time[0] + 1e-3))
@@ -174,9 +175,12 @@ def _plot_clearance(axes: Axes, run: Run) -> None:
     axes.axhline(margin, color=VERMILION, linewidth=0.9)
 
 
-def _plot_density(axes: Axes, run: Run, density: NavigationDensity) -> None:
+def _plot_density(axes: Axes, run: Run, world: World, density: NavigationDensity) -> None:
     rows = np.unique(np.linspace(0, len(run.time) - 1, _DENSITY_SAMPLES).astype(int))
-    values = _log_values(density, run.q[rows])
+    values = np.empty(len(rows))
+    for k, row in enumerate(rows):
+        world.set_time(float(run.time[row]))
+        values[k] = density.evaluate(run.q[row]).log_value
     shown = np.where(np.isfinite(values), values, np.nan)
     axes.plot(run.time[rows], shown, color=BLACK, linewidth=1.3)
     axes.set_ylabel("ln ρ")
@@ -214,7 +218,8 @@ def _plot_joint_space(
     axes.set_xlabel(f"{arm.joint_names[0]} [{_joint_unit(arm, 0)}]")
     axes.set_ylabel(f"{arm.joint_names[1]} [{_joint_unit(arm, 1)}]")
     shaded = "unsafe set (grey)" if density is None else "unsafe set (grey) and ln ρ to the goal"
-    axes.set_title(f"joint space: {shaded}")
+    moving = ", obstacles as they begin" if world.fastest_obstacle > 0.0 else ""
+    axes.set_title(f"joint space: {shaded}{moving}")
     axes.legend(loc="lower left", framealpha=0.95)
 
 

@@ -1,5 +1,6 @@
 """RenderScene: all there is to see of a run, before anything draws it."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise, product
 
@@ -7,10 +8,12 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
+from densarm.scene.obstacles import numbered
+from densarm.scene.scene import Scene
 from densarm.simulation.run import Run
 from densarm.values.arrays import Array
 from densarm.values.outcome import Outcome
-from densarm.visualization.bodies import arm_bodies, obstacle_bodies
+from densarm.visualization.bodies import Body, arm_bodies, obstacle_bodies
 from densarm.visualization.camera import Camera
 from densarm.visualization.palette import ClearanceScale
 from densarm.visualization.triangle_mesh import TriangleMesh, sphere_swept_hull, tube
@@ -64,7 +67,8 @@ class RenderScene:
         time: of the frames (N,), from 0 [s]; they are samples of the run.
         q: configuration at each frame (N, nq).
         robot: bodies of the arm.
-        obstacles: bodies of the scene.
+        obstacles: bodies of the scene, as it begins.
+        obstacle_poses: of those that move, by name, the pose at each frame (N).
         sensing_distance: the largest distance at which obstacles act, the margin included [m].
         closest: the closest pair at each frame; empty where there are no pairs.
         clearance: their distances [m].
@@ -83,11 +87,12 @@ class RenderScene:
         self._data = self._model.createData()
         rows = _key_rows(run)
         self.time, self.q = run.time[rows] - run.time[0], run.q[rows]
-        nearest = map(World(task.arm, task.scene).nearest, self.q)
-        origin = task.arm.origin
+        origin, world = task.arm.origin, World(task.arm, task.scene)
+        nearest = [_nearest_at(world, *row) for row in zip(self.q, run.time[rows], strict=True)]
         self.closest = [replace(pair, points=pair.points - origin) for pair in nearest if pair]
         self.robot = arm_bodies(task.arm)
         self.obstacles = obstacle_bodies(task.scene, origin)
+        self.obstacle_poses = _poses_in_motion(task.scene, self.obstacles, run.time[rows], origin)
         self._solid = [body for body in self.obstacles if body.has_end]
         self.sensing_distance = task.margin + task.sensing.distance
         self.clearance = np.array([pair.distance for pair in self.closest])
@@ -140,6 +145,25 @@ class RenderScene:
         margin = _SURROUNDINGS * np.max(high - low)
         corners = np.vstack([body.corners(poses[0]) for body in self._solid])
         return np.vstack([points, np.clip(corners, low - margin, high + margin)])
+
+
+def _nearest_at(world: World, q: Array, time: float) -> NearestPair | None:
+    world.set_time(time)
+    return world.nearest(q)
+
+
+def _poses_in_motion(
+    scene: Scene, bodies: Sequence[Body], time: Array, origin: Array
+) -> dict[str, list[pin.SE3]]:
+    """Return the poses of the bodies of obstacles with a motion at times (N,) [s]."""
+    placed, shift = {body.name: body.placement for body in bodies}, pin.SE3(np.eye(3), -origin)
+    found = {}
+    for obstacle in (item for item in scene if item.motion is not None):
+        begin = (shift * obstacle.pose_at(0.0)).inverse()
+        moves = [shift * obstacle.pose_at(each) * begin for each in time.tolist()]
+        for name in numbered(obstacle.name, len(obstacle.convex_shapes())):
+            found[name] = [move * placed[name] for move in moves]
+    return found
 
 
 def closest_line(

@@ -80,12 +80,12 @@ class ActivePairs:
 
     A pair whose distance was d_k at a query is at least
 
-    .. math:: d_k - \sum_j r_{kj} s_j
+    .. math:: d_k - \sum_j r_{kj} s_j - w_k
 
-    apart since, s_j being the way that joint j has gone, in steps along straight segments, and
-    r_kj the Lipschitz constants of the world. It sleeps, at no cost but this, until that falls to
-    its reach. All pairs wake while a slide is beyond its limits, where the constants do not hold;
-    pairs of an obstacle wake when it is moved.
+    apart since, s_j being the way that joint j has gone, in steps along straight segments, r_kj
+    the Lipschitz constants of the world, and w_k the way that its obstacle has been moved. It
+    sleeps, at no cost but this, until that falls to its reach. All pairs wake while a slide is
+    beyond its limits, where the constants do not hold.
 
     Queried distances do not depend on what was queried before, to the last bit. These are
     `DistanceBounds`: a sleeping pair can be woken by asking for its distance.
@@ -110,8 +110,9 @@ class ActivePairs:
         self._pair_states = np.array([[_AWAKE], [_NEVER], [0]]).repeat(world.n_pairs, axis=1)
         self.state: NDArray[np.int64] = self._pair_states[0]
         """Nonzero where a pair is awake (K,)."""
-        # Second row: after the joints have gone a way s, level - lipschitz @ s bounds the distance.
-        self._pair_numbers = np.zeros((2, world.n_pairs))
+        # Second row: after the joints have gone a way s and the obstacle w, the distance is at
+        # least level - lipschitz @ s - w. Third row: w at the last update.
+        self._pair_numbers = np.zeros((3, world.n_pairs))
         self.reach: Array = self._pair_numbers[0]
         """Distance up to which each pair is awake (K,) [m], which may be changed in place."""
         self._bounds: Array | None = None
@@ -125,6 +126,7 @@ class ActivePairs:
             self._pair_numbers,
             self._pair_states,
             world.changes,
+            world.obstacle_way,
         )
         self.update(rest)  # kernels are loaded, or compiled, before a control loop
         self.wake_all()
@@ -133,7 +135,7 @@ class ActivePairs:
     def distance(self) -> Array:
         """Distances at the last update (K,) [m]: exact for pairs awake, else lower bounds."""
         if self._bounds is None:
-            gone = self.world.lipschitz @ self._joint_numbers[0]
+            gone = self.world.lipschitz @ self._joint_numbers[0] + self._pair_numbers[2]
             asleep = self._pair_numbers[1] - gone - DISTANCE_TOLERANCE
             self._bounds = np.where(self.state == _ASLEEP, asleep, self.rows[:, 0])
         return self._bounds
@@ -203,13 +205,14 @@ def _wake(
     pair_numbers: Array,
     pair_states: NDArray[np.int64],
     changes: NDArray[np.int64],
+    obstacle_way: Array,
 ) -> tuple[int, int]:
     """Decide which pairs are awake at q; return how many, and how many changed.
 
     Into the last row of `pair_states` go the indices of pairs that wake, and the complements of
     those that fall asleep.
     """
-    reach, level = pair_numbers[0], pair_numbers[1]
+    reach, level, moved = pair_numbers[0], pair_numbers[1], pair_numbers[2]
     state, seen, changed = pair_states[0], pair_states[1], pair_states[2]
     wakes_all = not go(q, q_last, joint_index, joint_numbers)
     way, step = joint_numbers[0], joint_numbers[1]
@@ -219,13 +222,14 @@ def _wake(
         if change < 0:  # spare
             now, level[k] = _ASLEEP, np.inf
         elif change == seen[k] and not wakes_all:
-            gone = pair_motion(lipschitz, k, way)
+            by_joints = pair_motion(lipschitz, k, way)
             if before == _AWAKE:
-                level[k] = rows[k, 0] + (gone - pair_motion(lipschitz, k, step))
+                level[k] = rows[k, 0] + (by_joints - pair_motion(lipschitz, k, step)) + moved[k]
+            gone = by_joints + obstacle_way[k]
             # A sleep of a few steps saves nothing, but pairs that close to their reach are few.
             if level[k] - gone > reach[k] + 2.0 * DISTANCE_TOLERANCE:
                 now = _ASLEEP
-        state[k], seen[k] = now, change
+        state[k], seen[k], moved[k] = now, change, obstacle_way[k]
         n_awake += now
         if now != before:
             changed[n_changed] = k if now == _AWAKE else ~k

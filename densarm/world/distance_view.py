@@ -102,3 +102,34 @@ def add_pair_gradient(row: Array, jacobian: Array, sign: Array, factor: float, o
             slope += my * jacobian[4, j]
             slope += mz * jacobian[5, j]
             out[j] += factor * (sign[j] * slope)
+
+
+@compiled
+def pair_rates(rows: Array, twist: Array) -> Array:
+    r"""Return how fast each distance changes by the motion of its obstacle (K,) [m/s].
+
+    .. math:: \partial d_k / \partial t = n_k \cdot w_k
+
+    Args:
+        rows: as `DistanceView` has them (K, 10).
+        twist: `ChangingObstacles.twist` (K, 6).
+    """
+    rates = np.empty(rows.shape[0])
+    for k in range(rows.shape[0]):
+        rates[k] = pair_rate(rows[k], twist[k])
+    return rates
+
+
+@compiled_part
+def pair_rate(row: Array, twist: Array) -> float:
+    """Return n · w of one pair [m/s], w the velocity of body 2, an obstacle, at its nearest point.
+
+    Args:
+        row: [distance, normal, point 1, point 2], as `DistanceView` has it (10,).
+        twist: velocity of the obstacle's point at the origin, and angular (6,).
+    """
+    nx, ny, nz, px, py, pz = row[1], row[2], row[3], row[7], row[8], row[9]
+    rate: float = nx * twist[0] + ny * twist[1] + nz * twist[2]
+    rate += (py * nz - pz * ny) * twist[3] + (pz * nx - px * nz) * twist[4]
+    rate += (px * ny - py * nx) * twist[5]
+    return rate

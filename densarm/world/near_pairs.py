@@ -14,8 +14,9 @@ _SLACK = 0.02  # [m] beyond the smallest distance, up to which pairs are asked t
 class NearPairs:
     r"""Asks the pairs alone that may be nearer than a limit, along a motion.
 
-    A pair whose distance was d_k is at least :math:`d_k - \sum_j r_{kj} s_j` apart after the joints
-    have gone ways of s_j, r_kj the Lipschitz constants of the world.
+    A pair whose distance was d_k is at least :math:`d_k - \sum_j r_{kj} s_j - w_k` apart after the
+    joints have gone ways of s_j and its obstacle was moved by w_k, r_kj the Lipschitz constants of
+    the world.
 
     Unlike `ActivePairs` it returns the very numbers of `World.distances`.
 
@@ -25,15 +26,18 @@ class NearPairs:
 
     def __init__(self, world: World) -> None:
         self._world = world
-        self._version = 0
         self._smallest = np.inf
-        # Rows: after ways of s the distance is at least level - lipschitz @ s; the latter alone.
-        self._numbers = np.zeros((2, world.n_pairs))
-        # Rows: which question each pair was asked for last; a workspace.
-        self._asked = np.zeros((2, world.n_pairs), np.int64)
+        # Rows: after ways of s and w the distance is at least level - (lipschitz @ s + w); the
+        # latter alone.
+        self._numbers = np.full((2, world.n_pairs), -np.inf)
+        # Rows: which question each pair was asked for last; a workspace; `World.changes` then.
+        self._asked = np.zeros((3, world.n_pairs), np.int64)
         rest = world.arm.configurations(np.zeros(world.arm.nv))
         index, joints = world.arm.joint_index, joint_numbers(world.arm)
-        self._arrays = rest, index, world.lipschitz, joints, self._numbers, self._asked
+        self._arrays = (
+            *(rest, index, world.lipschitz, joints, self._numbers, self._asked),
+            *(world.changes, world.obstacle_way),
+        )
         self._question = 0
 
     def below(self, q: Array, limit: float) -> tuple[Pairs, Array]:
@@ -62,9 +66,6 @@ class NearPairs:
     def _ask(self, q: Array, limit: float) -> tuple[Pairs, Array, tuple[float, int]]:
         """Ask pairs that may be below a limit [m]; return them, all rows, and the nearest."""
         world, numbers = self._world, self._numbers
-        if self._version != world.version:
-            self._version = world.version
-            numbers[0] = np.where(world.changes < 0, np.inf, -np.inf)
         count = _may_be_below(q, limit, self._question, *self._arrays)
         pairs = self._asked[1, :count]
         rows = world.query(q, pairs)
@@ -83,10 +84,17 @@ def least_distances(world: World, q: Array, limit: float) -> Array:
     return least
 
 
-def smallest_distances(world: World, q: Array) -> Array:
-    """Return the smallest distance of all pairs at configurations (N, nq), (N,) [m]."""
-    pairs = NearPairs(world)
-    return np.array([pairs.smallest(row)[0] for row in q])
+def smallest_distances(world: World, q: Array, time: Array | None = None) -> Array:
+    """Return the smallest distance of all pairs at configurations (N, nq), (N,) [m].
+
+    Obstacles with a motion are where it has them at times (N,) [s], or None for as they are.
+    """
+    pairs, smallest = NearPairs(world), np.empty(len(q))
+    for k, row in enumerate(q):
+        if time is not None:
+            world.set_time(float(time[k]))
+        smallest[k] = pairs.smallest(row)[0]
+    return smallest
 
 
 @compiled
@@ -100,14 +108,19 @@ def _may_be_below(
     joints: Array,
     numbers: Array,
     asked: NDArray[np.int64],
+    changes: NDArray[np.int64],
+    obstacle_way: Array,
 ) -> int:
     """Go on to q; write which pairs have not been asked for a question, and are to be: how many."""
     level, gone, count = numbers[0], numbers[1], 0
     holds = go(q, q_last, joint_index, joints)
     for k in range(level.shape[0]):
-        if not holds and level[k] < np.inf:  # else it is spare
+        if changes[k] < 0:  # spare
+            level[k] = np.inf
+        elif not holds or changes[k] != asked[2, k]:
             level[k] = -np.inf
-        gone[k] = pair_motion(lipschitz, k, joints[0])
+        asked[2, k] = changes[k]
+        gone[k] = pair_motion(lipschitz, k, joints[0]) + obstacle_way[k]
         if asked[0, k] != question and level[k] - gone[k] - 2.0 * DISTANCE_TOLERANCE < limit:
             asked[0, k], asked[1, count] = question, k
             count += 1

@@ -1,16 +1,19 @@
 """ChangingObstacles: obstacles that are moved, added and removed in a geometry model that stays."""
 
-from dataclasses import fields, replace
-from typing import Any
+import math
 
 import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 
 from densarm.errors import InvalidValueError, SceneChangedError, UnknownNameError
-from densarm.scene.obstacles import Capsule, Obstacle, Sphere, obstacle_pose
+from densarm.scene.obstacles import Obstacle
 from densarm.scene.scene import Scene
 from densarm.values.arrays import Array
+from densarm.values.checks import finite_number
+from densarm.world.placed_obstacle import PlacedObstacle, checked_velocity
+
+_LONGEST_WAY = 1e4  # [m], beyond which sums of small steps would round off too much
 
 
 class ChangingObstacles:
@@ -36,25 +39,41 @@ class ChangingObstacles:
         self.version = 1
         """Number of changes to the obstacles so far, and one."""
         self.changes: NDArray[np.int64] = np.full(len(pair_shapes), self.version)
-        """For each pair, the `version` that its obstacle is of, negative if it is spare (K,)."""
+        """For each pair, the `version` that its obstacle came with, negative if spare (K,)."""
+        self.obstacle_way: Array = np.zeros(len(pair_shapes))
+        """How far a point of each pair's obstacle has moved at most since it came (K,) [m]."""
+        self.has_motion: NDArray[np.bool_] = np.zeros(len(pair_shapes), bool)
+        """Whether each pair's obstacle has a motion (K,)."""
+        self.twist: Array = np.zeros((len(pair_shapes), 6))
+        """Velocity of each pair's obstacle (K, 6): of its point at `Arm.origin` [m/s], and angular
+        [rad/s], both in the world frame."""
         self._shapes = list(geometry_model.geometryObjects)
+        self.spare_is_known = False
+        """Whether those who skip spare pairs know of the last one."""
         self._attachments = scene.attachments
-        self._origin = origin
-        self._spare: list[_Slot] = []
-        self._present: dict[str, _Slot] = {}
+        self._origin = np.append(origin, np.zeros(4))  # of poses
+        self._spare: list[PlacedObstacle] = []
+        self._present: dict[str, PlacedObstacle] = {}
         end = len(self._shapes) - sum(len(item.convex_shapes()) for item in scene)
         for obstacle in scene:
             begin, end = end, end + len(obstacle.convex_shapes())
-            pairs = np.flatnonzero((pair_shapes >= begin) & (pair_shapes < end)) // 2
-            self._present[obstacle.name] = _Slot(obstacle, self._shapes[begin:end], pairs)
+            own = np.flatnonzero((pair_shapes >= begin) & (pair_shapes < end)) // 2
+            pairs = slice(own[0], own[-1] + 1) if own.size else slice(0)
+            ways, twists = self.obstacle_way[pairs], self.twist[pairs]
+            slot = PlacedObstacle(self._shapes[begin:end], pairs, ways, twists)
+            slot.hold(obstacle, self._origin)
+            self.has_motion[pairs] = obstacle.motion is not None
+            self._present[obstacle.name] = slot
+        self._moving: list[PlacedObstacle] | None = None
         self._scene: Scene | None = None
         self._pairs: tuple[tuple[str, str], ...] | None = None
 
     @property
     def scene(self) -> Scene:
-        """The obstacles as they are now."""
+        """The obstacles as they are now; those with a motion as it has them at time zero."""
         if self._scene is None:
-            self._scene = Scene((s.obstacle for s in self._present.values()), self._attachments)
+            now = (slot.present() for slot in self._present.values())
+            self._scene = Scene(now, self._attachments)
         return self._scene
 
     @property
@@ -75,24 +94,79 @@ class ChangingObstacles:
             raise SceneChangedError
 
     def move_obstacle(
-        self, name: str, position: ArrayLike, orientation_xyzw: ArrayLike | None = None
+        self,
+        name: str,
+        position: ArrayLike,
+        orientation_xyzw: ArrayLike | None = None,
+        velocity: ArrayLike | None = None,
+        *,
+        time: float | None = None,
     ) -> None:
-        """Put an obstacle elsewhere.
+        """Put an obstacle elsewhere; at every step of a control loop, if need be.
+
+        Controllers go on with the distances there are then; what was proved of paths and plans
+        holds no longer. A motion of its own ends with it.
 
         Args:
             name: of the obstacle.
             position: origin of its frame (3,) [m].
             orientation_xyzw: unit quaternion of its frame; None to leave it.
+            velocity: of that origin (3,) [m/s], or of that and angular [rad/s] (6,), which it has
+                until the next move. None for the least-squares slope of the moves with times,
+                older ones fading within 50 ms, or for zero without a time.
+            time: when it was there [s].
 
         Raises:
             UnknownNameError: no such obstacle.
-            InvalidValueError: no pose.
+            InvalidValueError: no pose, no velocity, or no time.
         """
         slot = self._slot(name)
-        pose: dict[str, Any] = {"position": position}
-        if orientation_xyzw is not None:
-            pose["orientation_xyzw"] = orientation_xyzw
-        self._fill(slot, replace(slot.obstacle, **pose))
+        if velocity is not None:
+            velocity = checked_velocity(velocity)
+        if time is not None:
+            time = finite_number("time", time)
+        told = slot.checked_pose(position, orientation_xyzw)
+        slot.told, self._scene = told, None
+        if slot.obstacle.motion is not None:
+            slot.obstacle, self._moving = slot.present(), None
+            self.has_motion[slot.pairs] = False
+        self._put(slot, told, velocity, time)
+
+    def set_time(self, time: float) -> None:
+        """Put every obstacle with a motion where it is at a time [s], its velocity told."""
+        for slot in self._moving_slots():
+            pose = pin.SE3ToXYZQUAT(slot.obstacle.pose_at(time))
+            self._put(slot, pose, slot.obstacle.velocity_at(time), None)
+
+    def obstacle_velocity(self, name: str) -> Array:
+        """Return the velocity of an obstacle, as it was told or estimated last.
+
+        Args:
+            name: of the obstacle.
+
+        Returns:
+            That of its frame's origin [m/s], and angular [rad/s], in the world frame (6,).
+
+        Raises:
+            UnknownNameError: no such obstacle.
+        """
+        return self._slot(name).velocity.copy()
+
+    def motion_way(self, begin: float, end: float) -> Array:
+        """Return how far a point of each pair's obstacle goes at most between two times [s].
+
+        That is by the motions of obstacles, along which `set_time` puts them: (K,) [m].
+        """
+        way = np.zeros(len(self.pair_shapes))
+        for slot in self._moving_slots():
+            way[slot.pairs] = (end - begin) * slot.obstacle.speed_bound(begin, end)
+        return way
+
+    @property
+    def fastest_obstacle(self) -> float:
+        """Bound on the speed of all points of obstacles, by their motions [m/s]."""
+        speeds = [s.obstacle.speed_bound(-math.inf, math.inf) for s in self._moving_slots()]
+        return max(speeds, default=0.0)
 
     def add_obstacle(self, obstacle: Obstacle) -> None:
         """Put an obstacle in the place of a spare one.
@@ -151,12 +225,18 @@ class ChangingObstacles:
             if slot.obstacle != wanted[name]:
                 self._fill(slot, wanted[name])
 
-    def _slot(self, name: str) -> "_Slot":
+    def _moving_slots(self) -> list[PlacedObstacle]:
+        if self._moving is None:
+            there = self._present.values()
+            self._moving = [slot for slot in there if slot.obstacle.motion is not None]
+        return self._moving
+
+    def _slot(self, name: str) -> PlacedObstacle:
         if name not in self._present:
             raise UnknownNameError("obstacle", name, self._present)
         return self._present[name]
 
-    def _slots_for(self, new: list[Obstacle], free: "list[_Slot]") -> "list[_Slot]":
+    def _slots_for(self, new: list[Obstacle], free: list[PlacedObstacle]) -> list[PlacedObstacle]:
         """Return a free slot for each new obstacle, whose name no other body may have."""
         free_shapes = {item.name for slot in free for item in slot.shapes}
         taken = {item.name for item in self._shapes} - free_shapes
@@ -174,48 +254,30 @@ class ChangingObstacles:
             found.append(slot)
         return found
 
-    def _occupy(self, slot: "_Slot", obstacle: Obstacle) -> None:
+    def _occupy(self, slot: PlacedObstacle, obstacle: Obstacle) -> None:
         self._spare.remove(slot)
         self._present[obstacle.name] = slot
         self._pairs = None
         self._fill(slot, obstacle)
 
-    def _fill(self, slot: "_Slot", obstacle: Obstacle) -> None:
+    def _fill(self, slot: PlacedObstacle, obstacle: Obstacle) -> None:
         slot.hold(obstacle, self._origin)
+        self.has_motion[slot.pairs] = obstacle.motion is not None
         self._note(slot, 1)
 
-    def _note(self, slot: "_Slot", sign: int) -> None:
+    def _put(
+        self, slot: PlacedObstacle, pose: Array, velocity: Array | None, time: float | None
+    ) -> None:
+        """Put an obstacle at a pose in the world (7,), of a velocity, or at a time."""
+        way = slot.put(pose - self._origin, velocity, time)
+        if way > 0.0:
+            self.version += 1
+            if not slot.gone < _LONGEST_WAY:
+                slot.gone = self.obstacle_way[slot.pairs] = 0.0
+                self.changes[slot.pairs] = self.version
+
+    def _note(self, slot: PlacedObstacle, sign: int) -> None:
         self.version += 1
         self.changes[slot.pairs] = sign * self.version
-        self._scene = None
-
-
-class _Slot:
-    """The shapes of an obstacle in the geometry model, and the pairs that they are part of."""
-
-    def __init__(
-        self, obstacle: Obstacle, shapes: list[pin.GeometryObject], pairs: NDArray[np.int64]
-    ) -> None:
-        self.obstacle = obstacle
-        self.shapes = shapes
-        self.pairs = pairs
-
-    def can_hold(self, obstacle: Obstacle) -> bool:
-        if type(obstacle) is not type(self.obstacle):
-            return False
-        sizes = {item.name for item in fields(obstacle)} - {item.name for item in fields(Obstacle)}
-        return isinstance(obstacle, Sphere | Capsule) or all(
-            getattr(obstacle, size) == getattr(self.obstacle, size) for size in sizes
-        )
-
-    def hold(self, obstacle: Obstacle, origin: Array) -> None:
-        self.obstacle = obstacle
-        geometry = self.shapes[0].geometry
-        if isinstance(obstacle, Sphere | Capsule):
-            geometry.radius = obstacle.radius
-        if isinstance(obstacle, Capsule):
-            geometry.halfLength = 0.5 * obstacle.length
-        pose, one = obstacle_pose(obstacle, origin), len(self.shapes) == 1
-        for k, shape in enumerate(self.shapes):
-            shape.placement = pose
-            shape.name = obstacle.name if one else f"{obstacle.name}.{k}"
+        self.spare_is_known = False
+        self._scene = self._moving = None

@@ -9,10 +9,13 @@ from densarm.arms.arm import Arm
 from densarm.arms.dynamics import JointTorques
 from densarm.values.arrays import Array
 from densarm.world.separating_planes import SeparatingPlanes, configuration_tube
+from densarm.world.swept_check import SweptCheck, SweptVerdict
 from densarm.world.world import World
 
 HELD_SHARE = 0.95
 """Share of the acceleration limits that is asked for: a torque is held while the state changes."""
+
+_PIECES = 8  # of a stopping trajectory among moving obstacles
 
 _SHARES = np.array([0.0, 0.25, 0.5, 0.75, 1.0, 1.0])  # of T, at which torques are computed
 _BRAKES = np.array([1.0, 1.0, 1.0, 1.0, 1.0, 0.0])  # or, at last, holds
@@ -134,6 +137,9 @@ class StoppingCheck:
     one tube of radius δ_j. A proof of its middle with bodies grown by Σ_j r_kj δ_j proves all of
     them. Where there is none the samples are halved.
 
+    Pairs of obstacles with a motion are proved one sample after the other where times are told:
+    along a stopping trajectory q + v (t - t²/2T), obstacles moving meanwhile.
+
     Args:
         world: the pairs, and the Lipschitz constants r_kj of their distances.
         stopping: how the arm stops.
@@ -151,13 +157,15 @@ class StoppingCheck:
         self._arm = world.arm
         self._stopping = stopping
         self._planes = SeparatingPlanes(world, margin, kept)
+        self._swept = SweptCheck(world, margin, kept)
 
-    def check(self, q: Array, v: Array) -> StoppingResult:
+    def check(self, q: Array, v: Array, time: Array | None = None) -> StoppingResult:
         """Return from which samples stopping is proved.
 
         Args:
             q: configurations (N, nq).
             v: velocities (N, nv) [rad/s or m/s].
+            time: of the samples (N,) [s]; None for obstacles as they are now.
         """
         arm, limits = self._arm, self._arm.limits
         duration = self._stopping.durations(q, v)
@@ -167,7 +175,26 @@ class StoppingCheck:
         inside = np.asarray(outside <= _ROUNDING)
         turns = np.cumsum(arm.difference(q[:-1], q[1:]), axis=0)
         angles = arm.angles(q[0]) + np.vstack([np.zeros(arm.nv), turns])
-        return StoppingResult(duration, end, inside, self._clear(angles, travel))
+        if time is None:
+            clear = self._clear(angles, travel)
+        else:
+            clear = self._clear_meanwhile(angles, v, duration, time)
+        return StoppingResult(duration, end, inside, clear)
+
+    def _clear_meanwhile(
+        self, angles: Array, v: Array, duration: Array, time: Array
+    ) -> NDArray[np.bool_]:
+        """Return what is proved clear (N,) while obstacles move."""
+        shares = np.linspace(0.0, 1.0, _PIECES + 1)
+        clear = np.zeros(len(angles), dtype=np.bool_)
+        for n in np.flatnonzero(np.isfinite(angles + v).all(axis=1) & np.isfinite(duration)):
+            length = duration[n]
+            way = np.outer(length * shares * (1.0 - 0.5 * shares), v[n])
+            # The deceleration is v / T: off the chord of a piece by that times its time² / 8.
+            departure = np.tile(np.abs(v[n]) * length / (8.0 * _PIECES**2), (_PIECES, 1))
+            q, times = self._arm.configurations(angles[n] + way), time[n] + length * shares
+            clear[n] = self._swept.check(q, departure, times).verdict == SweptVerdict.CLEAR
+        return clear
 
     def _clear(self, angles: Array, travel: Array) -> NDArray[np.bool_]:
         n, end = len(angles), angles + travel

@@ -53,6 +53,8 @@ class SweptCheck:
     r_kj the Lipschitz constants of the world. If d_k(q_a) + d_k(q_b) > μ_k the pair is apart on the
     whole motion; else it is tried again on both halves of it.
 
+    What an obstacle goes meanwhile, by its motion, is added to μ_k where times are told.
+
     Args:
         world: the pairs.
         margin: distance that must be exceeded for a pair to count as apart [m].
@@ -110,7 +112,9 @@ class SweptCheck:
         result = self._bisect(_Polyline(self.arm, np.stack([q_a, q_b])), surplus)
         return result.evaluated if result.verdict == SweptVerdict.CLEAR else None
 
-    def check(self, q: Array, departure: Array | None = None) -> SweptResult:
+    def check(
+        self, q: Array, departure: Array | None = None, time: Array | None = None
+    ) -> SweptResult:
         """Return whether the motion through samples is proved clear.
 
         On an arc from a to b of the polyline through the samples the joints move by s_j, their
@@ -124,9 +128,14 @@ class SweptCheck:
         Args:
             q: samples (N, nq), N >= 1, joined by straight segments of joint space.
             departure: bound on how far the motion departs from each segment, per joint
-                (N - 1, nv) [rad or m]; None for zero.
+                (N - 1, nv) [rad or m], at any time; None for zero.
+            time: increasing times of the samples (N,) [s], between which time passes evenly on
+                each segment: obstacles with a motion are where it has them then, and the world
+                is left at some time of them. None for obstacles as they are now.
         """
-        return self._bisect(_Polyline(self.arm, q, departure))
+        fastest = self.world.fastest_obstacle
+        moves = time is not None and fastest > 0.0
+        return self._bisect(_Polyline(self.arm, q, departure, time if moves else None, fastest))
 
     def _bisect(self, line: "_Polyline", surplus: float = 1.0) -> SweptResult:
         """Prove pairs apart along a polyline.
@@ -137,6 +146,8 @@ class SweptCheck:
         every, met = np.arange(self.world.n_pairs), dict[float, float]()
 
         def margin_at(t: float, pairs: Pairs) -> Array:
+            if line.time.size:
+                self.world.set_time(line.time_at(t))
             margin = self.distance_margin(line.configuration(t), pairs)
             met[t] = float((margin + self._least[pairs]).min(initial=np.inf))
             return margin
@@ -149,8 +160,7 @@ class SweptCheck:
         pending = [(0.0, next(newest_first), 0.0, line.end, margin_a, margin_b, every)]
         while pending:
             _, _, a, b, margin_a, margin_b, pairs = heappop(pending)
-            motion = surplus * self.world.motion_bound(line.travel(a, b), pairs)
-            near = ~(margin_a + margin_b > motion)
+            near = ~(margin_a + margin_b > surplus * self._motion(line, a, b, pairs))
             if not near.any():
                 continue
             pairs, margin_a, margin_b = pairs[near], margin_a[near], margin_b[near]
@@ -165,6 +175,13 @@ class SweptCheck:
                 heappush(pending, (nearness, next(newest_first), *half, pairs))
         return self._result(SweptVerdict.CLEAR, met, min(met, key=met.__getitem__), every[:0])
 
+    def _motion(self, line: "_Polyline", a: float, b: float, pairs: Pairs) -> Array:
+        """Return how far bodies of pairs (P,) move against each other at most from a to b [m]."""
+        motion = self.world.motion_bound(line.travel(a, b), pairs)
+        if line.time.size:
+            motion += self.world.motion_way(line.time_at(a), line.time_at(b))[pairs]
+        return motion
+
     def _result(
         self, verdict: SweptVerdict, met: dict[float, float], at: float, failing: Pairs
     ) -> SweptResult:
@@ -175,9 +192,18 @@ class SweptCheck:
 class _Polyline:
     """The polyline through samples, its parameter t the index of a sample plus a fraction."""
 
-    def __init__(self, arm: Arm, q: Array, departure: Array | None = None) -> None:
+    def __init__(
+        self,
+        arm: Arm,
+        q: Array,
+        departure: Array | None = None,
+        time: Array | None = None,
+        fastest: float = 0.0,
+    ) -> None:
         self._arm = arm
         self._q = q
+        self.time = np.zeros(0) if time is None else time
+        self._fastest = fastest
         self._step = arm.difference(q[:-1], q[1:])
         self._departure = np.zeros_like(self._step) if departure is None else departure
         length = np.cumsum(np.abs(self._step), axis=0)
@@ -188,6 +214,11 @@ class _Polyline:
         k = int(t)
         return self._q[k] if k == t else self._arm.integrate(self._q[k], (t - k) * self._step[k])
 
+    def time_at(self, t: float) -> float:
+        k = int(t)
+        later = self.time[k + 1] - self.time[k] if k < t else 0.0
+        return float(self.time[k] + (t - k) * later)
+
     def travel(self, a: float, b: float) -> Array:
         """Return the bound s_j + 2 max δ_j (nv,) on the motion of the joints from a to b."""
         departure = self._departure[int(a) : int(np.ceil(b))].max(axis=0, initial=0.0)
@@ -196,7 +227,11 @@ class _Polyline:
     def split(self, a: float, b: float) -> float | None:
         if b - a > 1:
             return (a + b) // 2
-        longest = float(np.abs(self._step[int(a)]).max()) * (b - a) if b > a else 0.0
+        if not b > a:
+            return None
+        longest = float(np.abs(self._step[int(a)]).max()) * (b - a)
+        if self.time.size:
+            longest = max(longest, self._fastest * (self.time_at(b) - self.time_at(a)))
         return 0.5 * (a + b) if longest > _DEPTH_FLOOR else None
 
     def _length_at(self, t: float) -> Array:

@@ -15,7 +15,7 @@ from densarm.scene.obstacles import Obstacle, geometry_objects
 from densarm.scene.scene import Scene
 from densarm.values.arrays import Array
 from densarm.values.documented import documented
-from densarm.world.distance_view import add_pair_gradients
+from densarm.world.distance_view import add_pair_gradients, pair_rates
 from densarm.world.lipschitz import joint_support, shape_lipschitz
 from densarm.world.obstacle_slots import ChangingObstacles
 from densarm.world.pair_queries import PairQueries
@@ -41,6 +41,8 @@ class ClearanceSample:
     """Signed distance d_k of each pair (K,) [m]; negative in penetration."""
     gradient: Array
     """Gradient of each distance in the joint tangent space (K, nv) [m/rad or m/m]."""
+    rate: Array
+    """∂d_k/∂t = n_k · w_k (K,) [m/s], by the velocity w_k of an obstacle's nearest point."""
     pairs: tuple[tuple[str, str], ...]
     """Names of the two bodies of each pair."""
 
@@ -68,10 +70,11 @@ class World(ChangingObstacles):
     J the world-frame joint Jacobian and S_b the joints that move body b.
 
     Obstacles can be moved, added and removed between queries, at a cost that does not grow with
-    the scene. Room for those to come is made beforehand: a spare obstacle stands for any of its
-    shape and size, a spare sphere or capsule for those of any size. What finds no spare one needs
-    a new world with more of them and a new controller, which take milliseconds: made apart from
-    the control loop, `change_to` brings them up to date between two steps.
+    the scene; `set_time` moves those with a motion, as `simulate` asks for. Room for those to come
+    is made beforehand: a spare obstacle stands for any of its shape and size, a spare sphere or
+    capsule for those of any size. What finds no spare one needs a new world with more of them and
+    a new controller, which take milliseconds: made apart from the control loop, `change_to` brings
+    them up to date between two steps.
 
     Args:
         arm: the arm; its collision model holds the self-collision pairs.
@@ -111,7 +114,7 @@ class World(ChangingObstacles):
         """
         for obstacle in reserve.obstacles[len(scene) :]:
             self.remove_obstacle(obstacle.name)
-        self._is_spare, self._skipped = np.zeros(self.n_pairs, bool), 0
+        self._is_spare = np.zeros(self.n_pairs, bool)
 
     def clearance(self, q: ArrayLike) -> ClearanceSample:
         """Return the distances of all pairs and their gradients.
@@ -129,7 +132,8 @@ class World(ChangingObstacles):
         add_pair_gradients(rows, self._jacobian, self.sign, gradient)
         gradient[self._is_spare] = 0.0
         distance = np.where(self._is_spare, np.inf, rows[:, 0])
-        return ClearanceSample(distance, gradient, self.pairs)
+        rate = np.where(self._is_spare, 0.0, pair_rates(rows, self.twist))
+        return ClearanceSample(distance, gradient, rate, self.pairs)
 
     def distances(self, q: Array, pairs: Pairs | None = None) -> Array:
         """Return the distances alone, without checks.
@@ -190,7 +194,7 @@ class World(ChangingObstacles):
     def _measured(self, pairs: Pairs | None = None) -> Array:
         """Return the rows of `DistanceView`, new for some pairs or all."""
         model, data = self.geometry_model, self._geometry_data
-        if self._skipped != self.version:
+        if not self.spare_is_known:
             self._skip_spare_pairs()
         pin.updateGeometryPlacements(self.arm.model, self._data, model, data)
         if pairs is not None and len(pairs) < self.n_pairs:
@@ -200,7 +204,7 @@ class World(ChangingObstacles):
         return self._queries.rows
 
     def _skip_spare_pairs(self) -> None:
-        is_spare, self._skipped = self.changes < 0, self.version
+        is_spare, self.spare_is_known = self.changes < 0, True
         for k in np.flatnonzero(is_spare != self._is_spare).tolist():
             if is_spare[k]:
                 self._geometry_data.deactivateCollisionPair(k)

@@ -225,8 +225,9 @@ def test_obstacles_that_change_ask_for_other_sub_goals(swing_up: Scenario) -> No
     )
     name = next(iter(swing_up.scene)).name
     world.move_obstacle(name, (-1.5, 0.0, -0.6))
+    guided.update(swing_up.start)
     with pytest.raises(SceneChangedError):
-        guided.update(swing_up.start)
+        guided.sub_goal_in_sight(swing_up.start)
     guided.lead_along(SubGoals(check, direct, SensingParameters()))
     guided.update(swing_up.start)
     assert guided.density.log_psi == 0.0

@@ -13,7 +13,7 @@ from densarm.errors import DensarmError, FileContentError
 from densarm.scene.loading import load_problems, load_scene
 from densarm.scene.obstacles import Box, Cylinder
 
-POSE = {"position": [1.0, 0.1, 0.5], "orientation_xyzw": [0.0, 0.0, 0.0, 1.0]}
+POSE: Any = {"position": [1.0, 0.1, 0.5], "orientation_xyzw": [0.0, 0.0, 0.0, 1.0]}
 PROBLEM = {
     "scene": "box",
     "index": 2,

@@ -35,7 +35,7 @@ def test_json_takes_numpy_numbers() -> None:
         ([{"type": "sphere", "radius": 1}], "name = None: must be given"),
         (
             [{"type": "sphere", "name": "a", "radius": 1, "colour": "red"}],
-            r"unknown key of obstacle a \(sphere\) 'colour'.*known: name, orientation",
+            r"unknown key of obstacle a \(sphere\) 'colour'.*known: motion, name, orientation",
         ),
         (["box"], "obstacle = 'box': must be a table"),
         ([{"type": "sphere", "name": "a", "radius": 1}] * 2, "obstacle name = 'a': must be used"),

@@ -8,10 +8,13 @@ import pytest
 
 from densarm.arms.arm import Arm
 from densarm.arms.description import RobotDescription
+from densarm.scene.motion import BackAndForth
+from densarm.scene.obstacles import Capsule, Sphere
 from densarm.scene.scene import Scene
 from densarm.simulation.run import Run
 from densarm.values.arrays import Array
 from densarm.visualization.meshcat_drawing import draw
+from densarm.visualization.picture import Picture
 from densarm.visualization.render_scene import RenderScene
 
 NO_VISUALS = """
@@ -123,3 +126,25 @@ def test_animation_has_the_pose_of_every_joint_at_every_frame(
     turns = [pin.Quaternion(np.array(key["value"])).matrix() for key in quaternion["keys"]]
     expected = [scene.joint_poses(q)[2].rotation for q in scene.q]
     np.testing.assert_allclose(turns, expected, atol=1e-9)
+
+
+def test_obstacles_move_along(two_link: Arm, record: Callable[..., Run]) -> None:
+    motion = BackAndForth(position=(1.5, 0, 1), orientation_xyzw=(1, 0, 0, 0), period=3.0)
+    ball = Sphere(name="ball", radius=0.3, position=(1.5, 0.0, -0.5))
+    bar = Capsule(name="bar", radius=0.1, length=0.5, position=(-1.5, 0.0, -0.5), motion=motion)
+    run = record(two_link, np.zeros((50, 2)), 2.0, Scene([ball, bar]))
+    shown = RenderScene(run)
+    commands = drawn(shown).commands
+    (command,) = (c for c in commands if c["type"] == "set_animation")
+    clips = {c["path"]: c["clip"]["tracks"] for c in command["animations"]}
+    assert "/meshcat/obstacles/ball" not in clips
+    for group in ("obstacles", "sensing"):
+        position, quaternion = clips[f"/meshcat/{group}/bar"]
+        for k, time in enumerate(shown.time):
+            pose = bar.pose_at(time)
+            np.testing.assert_allclose(position["keys"][k]["value"], pose.translation, atol=1e-9)
+            turn = pin.Quaternion(np.array(quaternion["keys"][k]["value"])).matrix()
+            np.testing.assert_allclose(turn, pose.rotation, atol=1e-9)
+    pictures = [Picture(shown, 320, 180).frame(k) for k in (0, len(shown.time) - 1)]
+    below = [np.asarray(image, dtype=int)[40:-40] for image in pictures]
+    assert (np.abs(below[0] - below[1]).max(axis=2) > 8).sum() > 200
