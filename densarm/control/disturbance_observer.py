@@ -129,6 +129,10 @@ class DisturbanceObserver:
         )
         return max(elapsed, 0.0)
 
+    def set_bandwidth(self, bandwidth: float) -> None:
+        """Use another L [1/s]."""
+        self._numbers[1] = bandwidth
+
     def take_over(self, other: "DisturbanceObserver") -> None:
         """Go on from another's estimates and torques, of the same arm."""
         self._time = other._time

@@ -122,6 +122,10 @@ class InverseDynamics:
         """Go on from another's disturbance and torques, of the same arm."""
         self._observer.take_over(other._observer)
 
+    def set_bandwidth(self, bandwidth: float) -> None:
+        """Find disturbances with another bandwidth [1/s], as that of `ActuationParameters`."""
+        self._observer.set_bandwidth(bandwidth)
+
     @property
     def velocity(self) -> Array:
         """The velocity when a torque sent now acts (nv,) [rad/s or m/s]."""

@@ -15,6 +15,7 @@ from densarm.world.active_pairs import DistanceBounds
 from densarm.world.stopping import StoppingTrajectory
 
 _REST = 1e-3  # [rad/s or m/s], below which the arm is held where it is
+_GENTLE_BANDWIDTH = 8.0  # [1/s] of the observer, stable with a delay of 50 ms in the state
 _ACCELERATION_SHARE = 0.97  # asked for: a torque is held while the state changes
 
 
@@ -46,6 +47,7 @@ class StopAndHold:
         limit = _ACCELERATION_SHARE * arm.limits.acceleration
         self._dynamics = InverseDynamics(arm, limit, None, period, actuation)
         self._dynamics.load()
+        self._bandwidth = actuation.bandwidth
         self._time = 0.0
         self._stopping = StoppingTrajectory(arm, _ACCELERATION_SHARE)
         self._time_left = math.nan
@@ -64,6 +66,10 @@ class StopAndHold:
         self._time_left = self._stopping.duration(q, v)
         self._shortest = 1.0 / self._gains.velocity if is_gentle else self._period
         self._rest = None
+        trusted = self._bandwidth
+        self._dynamics.set_bandwidth(min(trusted, _GENTLE_BANDWIDTH) if is_gentle else trusted)
+        # What was observed when it stopped before is of another motion.
+        self._dynamics.update(math.nan, q, v)
 
     def torque(self, q: Array, v: Array, dt: float) -> Array:
         """Return the torque (nv,) [N·m or N] at q (nq,) and v (nv,), dt [s] after the last call."""

@@ -38,8 +38,8 @@ def make_controller(swing_up: Scenario, swing_up_motion: Motion) -> Callable[[st
 
 @pytest.fixture(scope="session")
 def panda() -> Arm:
-    """The Panda in capsules."""
-    return load_arm("panda", shapes="capsule")
+    """The Panda in capsules, its torque as quick as it is asked to be."""
+    return load_arm("panda", shapes="capsule", torque_rate=np.inf)
 
 
 @pytest.fixture(scope="session")

@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from densarm.arms.arm import Arm
 from densarm.certificates.task import SimulationParameters
 from densarm.control.controller import Gains
+from densarm.control.inverse_dynamics import TRUSTED
 from densarm.control.regulation import DensityRegulation, FieldRegulation
 from densarm.control.speed_law import SpeedLaw, SpeedParameters
 from densarm.density.goal_distance import InertiaDistance, TorusDistance
@@ -175,7 +176,7 @@ def test_torque_and_velocity_are_of_one_law(
 ) -> None:
     """At rest q̈ = K_v k(q), where no limit binds."""
     arm, gains = swing_up.arm, Gains(position=100.0, velocity=20.0)
-    controller = regulation(swing_up, gains=gains)
+    controller = regulation(swing_up, gains=gains, actuation=TRUSTED)
     q = arm.configuration(np.array(GOAL) + angles)
     wanted = gains.velocity * controller.velocity(0.0, q, REST)
     acceleration = settled_acceleration(controller, arm, q)
@@ -188,7 +189,7 @@ def test_in_the_plain_form_the_torque_itself_points_along_the_gradient(
     swing_up: Scenario, angles: tuple[float, float]
 ) -> None:
     arm, world = swing_up.arm, swing_up.world
-    controller = regulation(swing_up, plain=True)
+    controller = regulation(swing_up, plain=True, actuation=TRUSTED)
     q = arm.configuration(np.array(GOAL) + angles)
     acceleration = settled_acceleration(controller, arm, q)
     goal = controller.goal
@@ -202,7 +203,7 @@ def test_in_the_plain_form_the_torque_itself_points_along_the_gradient(
 
 
 def test_each_call_is_held_back_by_the_jerk_after_a_pause_again(swing_up: Scenario) -> None:
-    arm, controller = swing_up.arm, regulation(swing_up)
+    arm, controller = swing_up.arm, regulation(swing_up, actuation=TRUSTED)
     q = arm.configuration([0.5, 0.2])
     largest = arm.limits.acceleration * 0.001 * Gains().velocity
 

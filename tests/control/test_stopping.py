@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from densarm.arms.arm import Arm, load_arm
 from densarm.control.controller import Gains
-from densarm.control.inverse_dynamics import InverseDynamics
+from densarm.control.inverse_dynamics import TRUSTED, InverseDynamics
 from densarm.control.speed_law import SpeedLaw
 from densarm.control.stopping import BackupFilter, StopAndHold
 from densarm.scene.obstacles import Sphere
@@ -66,6 +66,20 @@ def test_it_stops_on_a_straight_line_in_the_time_of_the_trajectory_and_holds(
     np.testing.assert_allclose(way, 0.5 * duration * begun, rtol=0, atol=0.02)
 
 
+def test_a_second_stop_remembers_no_disturbance_of_the_first() -> None:
+    stop, ways = StopAndHold(ARM, Gains(), DT), []
+    for v in (REST, np.array([1.0, -1.0]), np.array([1.0, -1.0])):
+        q, start = ARM.configuration([0.3, -0.2]), ARM.configuration([0.3, -0.2])
+        stop.begin(q, v)
+        for k in range(400):
+            before = v
+            q, v = step(ARM, q, v, stop.torque(q, v, DT if k else 0.0))
+            change = np.abs(v - before) / DT
+            assert (change <= ARM.limits.acceleration * (1.0 + 1e-6)).all()
+        ways.append(ARM.difference(start, q))
+    np.testing.assert_allclose(ways[2], ways[1], rtol=0, atol=1e-4)
+
+
 def test_a_gentle_stop_ends_in_damping() -> None:
     q, v = ARM.postures["hanging"], np.array([1e-2, -1e-2])
     hard, gentle = StopAndHold(ARM, Gains(), DT), StopAndHold(ARM, Gains(), DT)
@@ -78,7 +92,7 @@ def test_a_gentle_stop_ends_in_damping() -> None:
 
 
 def test_a_push_while_it_holds_is_answered_by_the_gains() -> None:
-    stop, q = StopAndHold(ARM, Gains(), DT), ARM.configuration([0.4, -0.2])
+    stop, q = StopAndHold(ARM, Gains(), DT, TRUSTED), ARM.configuration([0.4, -0.2])
     stop.begin(q, REST)
     stop.torque(q, REST, 0.0)
     assert stop.is_holding
@@ -141,7 +155,8 @@ def test_what_is_harmless_is_let_through() -> None:
     q, v = ARM.postures["hanging"], np.zeros(2)
     dynamics.update(math.nan, q, v)
     wanted = dynamics.torque(v, np.array([0.5, 0.0]))
-    assert backup.torque(0.0, dynamics, q, v, wanted, exact(q)) is wanted
+    passed = backup.torque(0.0, dynamics, q, v, wanted, exact(q))
+    np.testing.assert_array_equal(passed, wanted)
 
 
 @pytest.mark.parametrize("margin", [0.0, 0.2])

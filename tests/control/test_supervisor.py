@@ -254,9 +254,9 @@ def test_a_controller_that_fails_stops_the_arm(setting: Setting, tau: Any) -> No
 
 
 def test_an_arm_that_strays_from_its_motion_is_stopped(setting: Setting) -> None:
-    loop = Loop(setting, Tolerances(tracking=0.003))
-    loop.push = np.array([3.0, 0.0])  # [rad/s²], which the observer takes for normal
-    loop.run(0.8)
+    loop = Loop(setting, Tolerances(position=0.5, velocity=5.0, tracking=0.003))
+    loop.push = np.array([20.0, 0.0])  # [rad/s²], more than torque can answer at once
+    loop.run(0.3)
     assert loop.fault == Fault.OFF_COURSE
     assert "reference" in loop.supervisor.status.sentence
     assert loop.supervisor.tracking_error == 0.0

@@ -12,6 +12,7 @@ from densarm.arms.arm import Arm
 from densarm.arms.catalogue import robots_folder
 from densarm.certificates.task import FORMAT, Task
 from densarm.control.controller import Gains
+from densarm.control.disturbance_observer import ActuationParameters
 from densarm.density.navigation_density import DensityParameters, Gauge
 from densarm.errors import DensarmError, FileContentError, InvalidValueError, UnknownNameError
 from densarm.scenarios.scenario import ControlForm, ControlParameters, Scenario, load_scenario
@@ -86,7 +87,8 @@ def test_round_trip_by_a_task_and_its_json(name: str) -> None:
     scenario = load_scenario(name)
     for again in (Scenario.of_task(scenario.task), rebuilt(scenario)):
         assert again.task.to_json() == scenario.task.to_json()
-        assert settings_of(again) == settings_of(scenario)
+        # A record keeps the gains that the form of control has by default.
+        assert settings_of(again) == {**settings_of(scenario), "gains": scenario.law_gains}
         np.testing.assert_array_equal([again.start, again.goal], [scenario.start, scenario.goal])
 
 
@@ -117,22 +119,27 @@ def test_every_setting_survives_the_round_trip(swing_up: Scenario) -> None:
         gains=Gains(position=25.0, velocity=10.0),
         **{
             key: halved(getattr(swing_up, key))
-            for key in ("sensing", "planning", "timing", "speed", "simulation")
+            for key in ("sensing", "planning", "timing", "speed", "actuation", "simulation")
         },
     )
     again = rebuilt(changed)
     assert settings_of(again) == settings_of(changed)
-    for key in ("control", "density", "sensing", "planning", "timing", "speed", "gains"):
+    keys = ("control", "density", "sensing", "planning", "timing", "speed", "gains", "actuation")
+    for key in keys:
         assert getattr(again, key) != getattr(swing_up, key)
 
 
 def halved(parameters: Any) -> Any:
-    """Return parameters with every number halved, but those that must be whole kept above 0."""
+    """Return parameters with every number halved, but those that must be whole kept above 0.
+
+    What is zero or not given becomes 0.01.
+    """
     changes = {
-        key: max(1, value // 2) if isinstance(value, int) else 0.5 * value
+        key: max(1, value // 2) if isinstance(value, int) else 0.5 * value or 0.01
         for key, value in asdict(parameters).items()
         if not isinstance(value, str | None)
     }
+    changes |= {key: 0.01 for key, value in asdict(parameters).items() if value is None}
     return replace(parameters, **changes)
 
 
@@ -140,7 +147,7 @@ def test_a_task_that_no_scenario_wrote_is_one_by_default(swing_up: Scenario) -> 
     task = Task(swing_up.arm, swing_up.scene, swing_up.start, swing_up.goal, margin=0.01)
     scenario = Scenario.of_task(task)
     assert scenario.control == ControlParameters(margin=0.01)
-    assert (scenario.gains, scenario.seed, scenario.name) == (None, 0, "run")
+    assert (scenario.actuation, scenario.seed, scenario.name) == (ActuationParameters(), 0, "run")
 
 
 def test_a_task_without_a_goal_is_no_scenario(swing_up: Scenario) -> None:
@@ -235,7 +242,7 @@ def test_cut_joints(tmp_path: Path) -> None:
         ("x = 2023-13-45", "not TOML"),
         (
             "gaols = 1\n" + BASE,
-            "unknown key 'gaols'; did you mean 'gains'? (known: control, density",
+            "unknown key 'gaols'; did you mean 'gains'? (known: actuation, control",
         ),
         (BASE + "[contrl]\n", "unknown key 'contrl'; did you mean 'control'?"),
         (BASE + "[control]\nfrom = 1\n", "unknown key of [control] 'from'; did you mean 'form'?"),
@@ -347,8 +354,8 @@ def test_json_that_is_not_a_task() -> None:
     for data in broken:
         with pytest.raises(DensarmError, match="not of format"):
             Task.from_json(data)
-    settings = {"seed", "planning", "timing", "speed", "gains", "input", "plant", "disturbances"}
-    for key in set(whole) - {"format", *settings}:
+    settings = {"seed", "planning", "timing", "speed", "gains", "actuation"}
+    for key in set(whole) - {"format", "input", "plant", "disturbances", *settings}:
         with pytest.raises(DensarmError, match=key):
             Task.from_json({k: v for k, v in whole.items() if k != key})
 

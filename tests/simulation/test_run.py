@@ -233,7 +233,8 @@ def test_a_pair_off_the_circle(tmp_path: Path, content: Content) -> None:
 
 def test_task_that_is_not_one(tmp_path: Path, content: Content) -> None:
     whole = json.loads(str(content["scenario"]))
-    own = set(whole) - {"name", "title", "seed", "planning", "timing", "speed", "gains"}
+    settings = {"seed", "planning", "timing", "speed", "gains", "actuation"}
+    own = set(whole) - {"name", "title", *settings}
     values: list[Any] = [None, 17.5, "x", [[]], {"x": 1}]
     broken = ["not JSON", "[]", "1", json.dumps({}), json.dumps({**whole, "format": 999})]
     broken += [
