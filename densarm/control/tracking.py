@@ -50,7 +50,8 @@ TRACKING_GAINS = Gains(position=1400.0, velocity=80.0)
 """Of tracking, whose feedback no cap on accelerations weakens."""
 
 _INTERVAL = 0.02  # [s] of the motion between computed distances
-_SMALLEST = 1e-6  # [m or rad], sensing distance where the motion leaves no distance to sense in
+# Sensing distances below which the feedback of a small error would shake the arm.
+_LEAST_DISTANCE, _LEAST_JOINT_DISTANCE = 1e-3, 5e-3  # [m], [rad or m]
 
 
 class DensityTracking:
@@ -254,7 +255,10 @@ def require_smooth_goal(
 def _sensed_off(
     world: World, motion: Motion, sensing: SensingParameters, kinematics: Kinematics
 ) -> tuple[UnsafeSet, UnsafeSet]:
-    """Return pairs and joint limits, sensed nowhere on a motion but where the arm is off it."""
+    """Return pairs and joint limits, sensed nowhere on a motion but where the arm is off it.
+
+    Those that the motion comes nearer than it is tracked are not sensed.
+    """
     arm = world.arm
     every = max(1, round(_INTERVAL / motion.period))
     angles = np.vstack([motion.position[::every], motion.position[-1:]])
@@ -264,13 +268,17 @@ def _sensed_off(
     least = least_distances(world, configurations, limit) - held
     angles = arm.angles(configurations)
     inside = np.minimum(angles - arm.limits.lower, arm.limits.upper - angles).min(axis=0)
-    pair_sensing = np.clip(sensing.path_share * least, _SMALLEST, sensing.distance)
-    joint_sensing = np.clip(sensing.path_share * inside, _SMALLEST, sensing.joint)
-    pairs = ActivePairs(world, kinematics)
-    return (
-        ClearanceSet(world, motion.margin, pair_sensing, pairs, sensing.distance),
-        JointLimitSet(arm, joint_sensing),
-    )
+    near = ActivePairs(world, kinematics)
+    pairs = ClearanceSet(world, motion.margin, sensing.distance, near, sensing.distance)
+    joints = JointLimitSet(arm, sensing.joint)
+    share = sensing.path_share * np.minimum(least, limit), sensing.path_share * inside
+    pairs.set_sensing_distance(_worth_sensing(share[0], _LEAST_DISTANCE, sensing.distance))
+    joints.set_sensing_distance(_worth_sensing(share[1], _LEAST_JOINT_DISTANCE, sensing.joint))
+    return pairs, joints
+
+
+def _worth_sensing(wanted: Array, least: float, most: float) -> Array:
+    return np.where(wanted < least, -np.inf, np.minimum(wanted, most))
 
 
 _POSITION, _VELOCITY, _ACCELERATION, _ERROR, _WEIGHTS = 0, 1, 2, 3, 4  # rows of a sample

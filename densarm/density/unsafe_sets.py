@@ -129,7 +129,7 @@ class ClearanceSet:
         self.set_sensing_distance(self.sensing_distance)
 
     def set_sensing_distance(self, sensing_distance: Array) -> None:
-        """Sense the pairs at other distances from now on, σ > 0 (K,) [m]."""
+        """Sense the pairs at other distances from now on, σ > 0 (K,) [m]; -inf: not at all."""
         self.sensing_distance[:] = self._standing[:] = sensing_distance
         if self._moving is not None:
             is_moving = self._is_moving()
@@ -191,12 +191,15 @@ class JointLimitSet:
         self.index = np.array([joint, arm.idx_q[joint]], dtype=np.int64)
         """Where in the tangent space and in q each limited joint is (2, M)."""
         side = np.where(members < arm.nv, 1.0, -1.0)
-        self.member = np.array([bounds[members], side, width[joint]])
+        self._bounds = bounds[members]
+        self.member = np.array([self._bounds, side, width[joint]])
         """Limits [rad or m], 1 for a lower and -1 for an upper one, and σ [rad or m] (3, M)."""
 
     def set_sensing_distance(self, sensing_distance: Array) -> None:
-        """Sense the limits at other distances from now on, σ > 0 (nv,) [rad or m]."""
-        self.member[2] = sensing_distance[self.index[0]]
+        """Sense the limits at others from now on, σ > 0 (nv,) [rad or m]; -inf: not at all."""
+        width, side = sensing_distance[self.index[0]], self.member[1]
+        self.member[0] = np.where(width > 0.0, self._bounds, -side * np.inf)
+        self.member[2] = np.where(width > 0.0, width, 1.0)
 
     def add_log_bump(self, q: Array, theta: float, out_gradient: Array) -> float:
         """Act as `UnsafeSet.add_log_bump`."""

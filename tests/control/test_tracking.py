@@ -1,6 +1,5 @@
 """DensityTracking: its one kernel is the law of its parts, whichever pairs are queried."""
 
-import math
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -29,7 +28,6 @@ from densarm.planning.motion import Motion
 from densarm.scenarios.scenario import Scenario
 from densarm.values.arrays import Array
 from densarm.world.active_pairs import ActivePairs
-from densarm.world.stopping import HELD_SHARE
 from densarm.world.swept_check import SweptCheck
 from densarm.world.world import World
 
@@ -130,9 +128,7 @@ def test_torque_is_that_of_all_pairs_to_the_last_bit(
         awake.append(int(np.count_nonzero(pairs.state)))
 
     monkeypatch.setattr(ActivePairs, "update", watched)
-    few, every = (
-        DensityTracking(among_spheres, panda_swing, actuation=TRUSTED) for _ in range(2)
-    )
+    few, every = (DensityTracking(among_spheres, panda_swing, actuation=TRUSTED) for _ in range(2))
     for state in states(panda, panda_swing):
         wakes = False
         expected = few.torque(*state)
