@@ -9,7 +9,7 @@ at 1 kHz.
 Controllers are told nothing but a delay that is declared. Pushes last 20 ms, at random joints and
 times from which the arm could still be stopped in free space, as `StoppingCheck` proves.
 
-Errors are medians over the runs: the largest off the motion, and that left after a second at rest.
+Errors are medians over the runs: the largest off the motion, and that left at the end.
 """
 
 import argparse
@@ -40,7 +40,6 @@ SCENARIOS = ("panda_table", "panda_shelf", "panda_holding_bar")
 PROBLEMS = 12  # of the file, at most
 PUSHES = 4  # of each problem
 PUSH, PUSH_TIME = 2.0, 0.02  # [rad/s], [s]
-REST = 1.0  # [s] for which the goal is held before a run ends
 LONGEST = 5.0  # [s] after the motion's end
 
 
@@ -88,10 +87,7 @@ def torque_rate(run: densarm.Run) -> float:
 
 
 def ended_at_goal(run: densarm.Run) -> bool:
-    """Whether a run ended at its goal and slow, touching nothing, however long it has been there.
-
-    The loop's own outcome asks for a second within half of these bounds, which noise may not leave.
-    """
+    """Whether a run ended at its goal and slow, touching nothing, however long it has been there."""
     is_slow = float(np.abs(run.v[-1]).max()) <= REACHED_VELOCITY
     return run.outcome != Outcome.COLLIDED and is_slow and run.goal_error <= REACHED_POSITION
 
@@ -181,8 +177,7 @@ def run_cases(
         for told in told_in(CASES[name], scenario, motion, seed):
             parameters = replace(
                 scenario.simulation,
-                hold_time=REST,
-                time_limit=moves + REST + LONGEST,
+                time_limit=moves + LONGEST,
                 stall_time=2.0,
             )
             controller = make(CASES[name].declared)

@@ -30,7 +30,7 @@ from densarm.world.world import World
 OnProgress = Callable[[str], None]
 """Told in a phrase what is being done."""
 
-_HELD_SHARE = 0.5  # the loop ends well inside the bounds on position and velocity at the goal
+_HELD_SHARE = 0.5  # the loop ends well inside the bound on position at the goal
 _STALL_MOTION = 0.01  # [rad or m] within the stall time
 _PROGRESS_INTERVAL = 200  # steps
 _NEAREST = 3  # pairs named where an arm rests
@@ -231,7 +231,7 @@ class _Loop:
         return f"{touching or told} ({told}, smallest distance {1e3 * distance:.3g} mm by coal)"
 
     def _is_at_goal(self, q: Array, v: Array) -> bool:
-        if self.task.goal is None or np.abs(v).max() > _HELD_SHARE * REACHED_VELOCITY:
+        if self.task.goal is None or np.abs(v).max() > REACHED_VELOCITY:
             return False
         return self._distance(self.task.goal, q) <= _HELD_SHARE * REACHED_POSITION
 
