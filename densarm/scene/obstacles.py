@@ -77,22 +77,25 @@ class Obstacle(ABC):
         ends = [extreme_points(shape) for shape in self.convex_shapes()]
         return max(float(np.linalg.norm(x, axis=1).max()) + radius for x, radius in ends)
 
+    @cached_property
+    def _own_pose(self) -> pin.SE3:
+        return obstacle_pose(self)
+
     def pose_at(self, time: float) -> pin.SE3:
         """Return the pose of its frame at a time [s]."""
-        own = obstacle_pose(self)
-        return own if self.motion is None else self.motion.pose(time, own)
+        if self.motion is None:
+            return obstacle_pose(self)
+        return self.motion.pose(time, self._own_pose)
 
     def velocity_at(self, time: float) -> Array:
         """Return the velocity of its frame's origin [m/s] and of its turning [rad/s] (6,)."""
-        return (
-            np.zeros(6) if self.motion is None else self.motion.velocity(time, obstacle_pose(self))
-        )
+        return np.zeros(6) if self.motion is None else self.motion.velocity(time, self._own_pose)
 
     def speed_bound(self, begin: float, end: float) -> float:
         """Return a bound on the speed of all its points between two times [m/s]."""
         if self.motion is None:
             return 0.0
-        linear, angular = self.motion.speed_bounds(begin, end, obstacle_pose(self))
+        linear, angular = self.motion.speed_bounds(begin, end, self._own_pose)
         return linear + (
             angular * (self.reach + math.hypot(*self.motion.pivot)) if angular else 0.0
         )
@@ -106,11 +109,8 @@ class Obstacle(ABC):
         name, own = f"{self.name}.motion", obstacle_pose(self)
         if not isinstance(motion, ObstacleMotion):
             raise InvalidValueError(name, motion, "an ObstacleMotion")
-        bounds = (
-            *motion.speed_bounds(-math.inf, math.inf, own),
-            self.speed_bound(-math.inf, math.inf),
-        )
-        for speed, unit in zip(bounds, ("m/s", "rad/s", "m/s everywhere"), strict=True):
+        bounds = motion.speed_bounds(-math.inf, math.inf, own)
+        for speed, unit in zip(bounds, ("m/s", "rad/s"), strict=True):
             if not speed <= FASTEST:
                 raise InvalidValueError(f"{name} [{unit}]", speed, f"at most {FASTEST:g}")
         begun = motion.pose(0.0, own)
@@ -119,8 +119,9 @@ class Obstacle(ABC):
         values = pin.SE3ToXYZQUAT(begun).tolist()
         for key, value in (("position", values[:3]), ("orientation_xyzw", values[3:])):
             given = getattr(self, key)
-            is_other = not np.allclose(given, value, rtol=0.0, atol=_SAME_POSE)
-            if is_other and given != getattr(Obstacle, key) and key == "position":
+            signs = (1.0, -1.0) if key == "orientation_xyzw" else (1.0,)
+            away = min(np.abs(np.subtract(given, np.multiply(x, value))).max() for x in signs)
+            if away > _SAME_POSE and given != getattr(Obstacle, key):
                 raise InvalidValueError(f"{self.name}.{key}", given, f"left out, or {value}")
             self._store(**{key: tuple(value)})
 
@@ -241,6 +242,8 @@ class HalfSpace(Obstacle):
         if not abs(offset) < FARTHEST:
             raise InvalidValueError(f"{self.name}.offset", offset, "less than 1000 km away")
         self._store(normal=tuple(unit.tolist()), offset=offset)
+        if not math.isfinite(self.speed_bound(-math.inf, math.inf)):
+            raise InvalidValueError(f"{self.name}.motion", self.motion, "one that does not turn")
 
     @cached_property
     def reach(self) -> float:

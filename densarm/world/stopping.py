@@ -178,13 +178,13 @@ class StoppingCheck:
         if time is None:
             clear = self._clear(angles, travel)
         else:
-            clear = self._clear_meanwhile(angles, v, duration, time)
+            clear = self._clear_meanwhile(angles, v, np.where(inside, duration, np.inf), time)
         return StoppingResult(duration, end, inside, clear)
 
     def _clear_meanwhile(
         self, angles: Array, v: Array, duration: Array, time: Array
     ) -> NDArray[np.bool_]:
-        """Return what is proved clear (N,) while obstacles move."""
+        """Return what is proved clear (N,) while obstacles move, of what has a duration."""
         shares = np.linspace(0.0, 1.0, _PIECES + 1)
         clear = np.zeros(len(angles), dtype=np.bool_)
         for n in np.flatnonzero(np.isfinite(angles + v).all(axis=1) & np.isfinite(duration)):

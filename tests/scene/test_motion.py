@@ -150,6 +150,7 @@ WAY: dict[str, Any] = {"type": "waypoints", "times": [0, 1], "positions": [[0, 0
         (WAY | {"positions": [[0, 0, 1], [0, 0, 1e3]]}, r"a.motion \[m/s\] = 999.0: must be at"),
         (WAY | {"orientations_xyzw": [[0, 0, 0, 1]] * 3}, "motion.orientations_xyzw = 3"),
         (WAY | {"orientations_xyzw": [[0, 0, 0, 1], [0, 0, 0, 2]]}, "unit quaternion"),
+        (WAY | {"orientations_xyzw": [[1, 0, 0, 0]] * 2}, "a.orientation_xyzw = .*left out, or"),
         (WAY | {"positions": [[1, 0, 1], [1, 1, 1]]}, r"a.position = .*left out, or \[1.0, 0.0"),
         ({"type": "back_and_forth", "position": [0, 0, 1], "period": 0}, "motion.period = 0"),
         ({"type": "back_and_forth", "position": [9, 0, 1], "period": 1e-3}, "at most 100"),
@@ -160,7 +161,8 @@ WAY: dict[str, Any] = {"type": "waypoints", "times": [0, 1], "positions": [[0, 0
     ],
 )
 def test_motions_that_are_refused(motion: Any, message: str) -> None:
-    table = {"type": "sphere", "name": "a", "radius": 0.1, "position": [0, 0, 1], "motion": motion}
+    pose = {"position": [0, 0, 1], "orientation_xyzw": [0, 1, 0, 0]}
+    table = {"type": "sphere", "name": "a", "radius": 0.1, **pose, "motion": motion}
     with pytest.raises(DensarmError, match=message) as error:
         parse_obstacle(table)
     assert "\n" not in str(error.value)
@@ -169,8 +171,14 @@ def test_motions_that_are_refused(motion: Any, message: str) -> None:
 def test_what_has_no_end_may_rise_but_not_turn() -> None:
     rises = ConstantVelocity(linear=(0, 0, 0.1))
     assert HalfSpace(name="floor", motion=rises).speed_bound(0, 1) == pytest.approx(0.1)
-    with pytest.raises(DensarmError, match=r"floor.motion .* = inf: must be at most"):
+    with pytest.raises(DensarmError, match=r"floor.motion = .*: must be one that does not turn"):
         HalfSpace(name="floor", motion=ConstantVelocity(linear=(0, 0, 0), angular=(1, 0, 0)))
+
+
+def test_sizes_are_checked_of_what_turns_too() -> None:
+    turns = ConstantVelocity(linear=(0, 0, 0), angular=(0, 0, 1))
+    with pytest.raises(DensarmError, match=r"box\.size"):
+        Box(name="box", size=(0.1, -0.1, 0.1), motion=turns)
 
 
 def test_what_a_link_holds_has_no_motion_of_its_own() -> None:
