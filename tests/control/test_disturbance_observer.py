@@ -75,7 +75,8 @@ def test_a_constant_torque_is_found_within_time_constants(
 
 def test_it_is_no_more_than_motors_could_bear(arm: Arm) -> None:
     loop = at_rest(arm).run(0.05, 5.0 * arm.limits.effort)
-    np.testing.assert_allclose(loop.dynamics.disturbance, 0.9 * arm.limits.effort)
+    share = np.abs(loop.dynamics.disturbance) / arm.limits.effort
+    np.testing.assert_allclose(share, 0.9)
 
 
 def test_without_bandwidth_the_state_is_the_measured_one(arm: Arm) -> None:
@@ -99,8 +100,7 @@ def test_where_a_declared_delay_leads_is_foreseen(arm: Arm, late: int) -> None:
     for _ in range(20):
         loop.run(DT, np.zeros(arm.nv))
         before, foreseen = loop.v, (loop.dynamics.angles, loop.dynamics.velocity)
-        ahead = Damped(arm, loop.q, loop.v, declared, late)
-        ahead.sent, q, v = deque(loop.sent), loop.q, loop.v
+        q, v = loop.q, loop.v
         for tau in list(loop.sent)[: late - 1]:  # the state was measured a step before
             v = v + DT * pin.aba(arm.model, arm.data, q, v, tau)
             q = arm.integrate(q, DT * v)
