@@ -132,9 +132,7 @@ def test_torque_is_that_of_all_pairs_to_the_last_bit(
         awake.append(int(np.count_nonzero(pairs.state)))
 
     monkeypatch.setattr(ActivePairs, "update", watched)
-    few, every = (
-        DensityTracking(among_spheres, panda_swing, actuation=TRUSTED) for _ in range(2)
-    )
+    few, every = (DensityTracking(among_spheres, panda_swing, actuation=TRUSTED) for _ in range(2))
     for state in states(panda, panda_swing):
         wakes = False
         expected = few.torque(*state)
