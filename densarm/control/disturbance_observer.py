@@ -16,7 +16,8 @@ from densarm.values.kernels import compiled, compiled_part
 ANGLE, VELOCITY, DISTURBANCE, AHEAD_ANGLE, AHEAD_VELOCITY = 0, 1, 2, 3, 4
 FREE = 5  # the torque sent last, without the gravity then
 _NONLINEAR, _GRAVITY, _INNOVATION, _ACCELERATION, _LARGEST, _JITTER = 6, 7, 8, 9, 10, 11
-N_ROWS = 12
+FREE_INERTIA = 12  # 1 / (M⁻¹)_ii, what a joint moves where the others give way
+N_ROWS = 13
 
 _JITTER_SHARE = 0.0012  # of the torque limits, by which noise may move a disturbance in a period
 _TRUSTED_SHARE = 0.9  # of the torque limits, that a disturbance may be taken to have
@@ -157,6 +158,10 @@ def _observe(  # noqa: C901  # one kernel, since every call has its cost
     dt, delay, size, nv = numbers[0], numbers[2], sent.shape[0], v.size
     angle, velocity, disturbance = rows[ANGLE], rows[VELOCITY], rows[DISTURBANCE]
     acceleration, innovation = rows[_ACCELERATION], rows[_INNOVATION]
+    if dt == 0.0:
+        return
+    _factorise(mass, factor)
+    _write_free_inertia(factor, acceleration, rows[FREE_INERTIA])
     if dt < 0.0:
         for i in range(nv):
             angle[i], velocity[i], disturbance[i] = _position(q, joint_index, i), v[i], 0.0
@@ -166,11 +171,8 @@ def _observe(  # noqa: C901  # one kernel, since every call has its cost
                 sent[k, i] = gravity[i]
             rows[_GRAVITY, i], rows[FREE, i] = gravity[i], 0.0
         return
-    if dt == 0.0:
-        return
     acting = size - 1 - min(int(delay / dt + 0.5), size - 1)
     pole = math.exp(-min(numbers[1], 1.0 / (dt + delay)) * dt)
-    _factorise(mass, factor)
     for i in range(nv):
         acceleration[i] = sent[acting, i] + disturbance[i] - rows[_NONLINEAR, i]
     _solve(factor, acceleration)
@@ -225,6 +227,21 @@ def _factorise(mass: Array, factor: Array) -> None:
             for k in range(j):
                 entry -= factor[i, k] * factor[j, k]
             factor[i, j] = entry / factor[j, j]
+
+
+@compiled_part
+def _write_free_inertia(factor: Array, column: Array, out: Array) -> None:
+    """Write 1 / (M⁻¹)_ii (nv,), by the columns of L⁻¹."""
+    n = out.shape[0]
+    for i in range(n):
+        square = 0.0
+        for j in range(i, n):
+            entry = 1.0 if j == i else 0.0
+            for k in range(i, j):
+                entry -= factor[j, k] * column[k]
+            column[j] = entry / factor[j, j]
+            square += column[j] * column[j]
+        out[i] = 1.0 / square
 
 
 @compiled_part

@@ -12,6 +12,7 @@ from densarm.control.disturbance_observer import (
     AHEAD_VELOCITY,
     DISTURBANCE,
     FREE,
+    FREE_INERTIA,
     N_ROWS,
     ActuationParameters,
     DisturbanceObserver,
@@ -221,7 +222,8 @@ def robust_torque(
 
     joint by joint within the torque limits. J_i is the jerk of which half the torque rate is
     capable: feedback that asks for more overshoots. D is smaller where it would let the lag of a
-    torque make the loop unstable: K_v (M + D) / M stays below a bound over the lag.
+    torque make the loop unstable: K_v (1 + D M⁻¹) stays below a bound over the lag, on the
+    diagonal, M⁻¹ being large where M is nearly singular.
 
     Args:
         mass: M, upper triangle (nv, nv).
@@ -236,7 +238,7 @@ def robust_torque(
     feedback, bound = rows[_ATTRACT_TORQUE], _LARGEST_LAG / (gain * late) - 1.0
     for i in range(n):
         inertia = mass[i, i]
-        floor = min(rows[INERTIA_FLOOR, i], max(bound, 0.0) * inertia)
+        floor = min(rows[INERTIA_FLOOR, i], max(bound, 0.0) * rows[FREE_INERTIA, i])
         a = rows[ATTRACT, i]
         jerk = _FEEDBACK_RATE * rows[RATE_LIMIT, i] / (elapsed * (inertia + floor))
         feedback[i] = _clipped(a, math.sqrt(2.0 * jerk * abs(a) / gain))

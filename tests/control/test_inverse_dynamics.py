@@ -132,3 +132,45 @@ def test_a_brake_is_no_harder_than_its_duration_and_no_shorter_than_that_allows(
     for duration, used in ((0.5, 0.5), (1e-9, shortest), (np.inf, shortest)):
         tau = dynamics.brake_torque(v, duration, shortest)
         np.testing.assert_array_equal(tau, dynamics.torque(-v / used, held))
+
+
+# Torque that is sent.
+
+
+@pytest.fixture(scope="module")
+def rated(arm: Arm) -> Arm:
+    """The arm, its torque changing by 1 N·m in a millisecond at most."""
+    return load_arm(arm.name, torque_rate=1000.0)
+
+
+@settings(max_examples=30)
+@given(state=states(speed=0.5), wanted=vectors(7, 60.0), quick=st.booleans())
+def test_torque_beside_gravity_changes_by_its_rate_but_in_an_emergency(
+    rated: Arm, state: State, wanted: Array, quick: bool
+) -> None:
+    arm, period = rated, 0.0005 if quick else 0.002
+    dynamics = InverseDynamics(arm, arm.limits.acceleration, period=period)
+    q, v = arm.configuration(0.3 * state[0][: arm.nv]), state[1][: arm.nv]
+    before, most = np.zeros(arm.nv), 1000.0 * period * (1.0 + 1e-9) + 1e-9
+    for k in range(6):
+        dynamics.update(k * period, q, v)
+        gravity = arm.nonlinear_effects(q, np.zeros(arm.nv))
+        tau = dynamics.send((-1.0) ** (k // 3) * wanted[: arm.nv])
+        assert (np.abs(tau) <= arm.limits.effort).all()
+        # The first command too, by what holds the arm.
+        free = tau - gravity
+        inside = np.abs(tau) < arm.limits.effort
+        assert (np.abs(free - before)[inside] <= most).all()
+        np.testing.assert_array_equal(dynamics.sent[-1], tau)
+        before, q = free, arm.integrate(q, period * v)
+    dynamics.update(6 * period, q, v)
+    np.testing.assert_array_equal(
+        dynamics.send(wanted[: arm.nv], is_emergency=True),
+        np.clip(wanted[: arm.nv], -arm.limits.effort, arm.limits.effort),
+    )
+
+
+def test_without_a_time_no_rate_is_known(rated: Arm) -> None:
+    dynamics = InverseDynamics(rated, rated.limits.acceleration)
+    dynamics.update(math.nan, rated.configuration(np.zeros(rated.nv)), np.zeros(rated.nv))
+    np.testing.assert_array_equal(dynamics.send(np.full(rated.nv, 11.0)), 11.0)

@@ -9,11 +9,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from densarm.arms.arm import Arm
+from densarm.arms.arm import Arm, load_arm
 from densarm.control.controller import Gains
 from densarm.control.disturbance_observer import ActuationParameters
 from densarm.control.inverse_dynamics import TRUSTED
-from densarm.control.tracking import DensityTracking
+from densarm.control.tracking import TRACKING_GAINS, DensityTracking
 from densarm.density.goal_distance import TorusDistance
 from densarm.density.navigation_density import DensityParameters, Gauge, NavigationDensity
 from densarm.density.unsafe_sets import (
@@ -26,6 +26,7 @@ from densarm.density.unsafe_sets import (
 from densarm.errors import InvalidValueError
 from densarm.planning.motion import Motion
 from densarm.scenarios.scenario import Scenario
+from densarm.scene.scene import Scene
 from densarm.values.arrays import Array
 from densarm.world.active_pairs import ActivePairs
 from densarm.world.swept_check import SweptCheck
@@ -82,7 +83,8 @@ def test_torque_is_that_of_its_parts(
         mass = panda.mass_matrix(q)
         # D is less where a period is so long that K_v would make it unstable.
         lag = GAINS.velocity * panda_swing.period
-        floor = np.minimum(actuation.inertia_floor, (0.6 / lag - 1.0) * mass.diagonal())
+        alone = 1.0 / np.linalg.inv(mass).diagonal()
+        floor = np.minimum(actuation.inertia_floor, (0.6 / lag - 1.0) * alone)
         expected = mass @ (point.acceleration + feedback) + floor * feedback
         expected = np.clip(expected + panda.nonlinear_effects(q, v), -limits.effort, limits.effort)
         np.testing.assert_allclose(anew(controller, t, q, v), expected, rtol=1e-12, atol=1e-11)
@@ -173,6 +175,23 @@ def test_an_own_goal_distance_of_the_same_values_gives_the_same_torque(
         expected = built_in.torque(*state)
         np.testing.assert_allclose(own.torque(*state), expected, rtol=1e-10, atol=1e-10)
         assert own.tracking_error == pytest.approx(built_in.tracking_error, rel=1e-9)
+
+
+@pytest.mark.parametrize("name", ["kinova", "panda"])
+def test_inertia_of_gears_makes_no_feedback_faster_than_its_lag_bears(name: str) -> None:
+    """M may be nearly singular where no joint has little inertia by itself."""
+    arm, random, period = load_arm(name, torque_rate=np.inf), np.random.default_rng(0), 0.001
+    world, low, high = World(arm, Scene()), arm.limits.lower, arm.limits.upper
+    for _ in range(10):
+        angles = random.uniform(np.clip(low, -3.0, 3.0), np.clip(high, -3.0, 3.0))
+        q, still = arm.configuration(angles), np.zeros((3, arm.nv))
+        controller = DensityTracking(world, Motion(period, still + angles, still))
+        speed = 1e-4
+        taus = [anew(controller, 0.0, q, v) for v in speed * np.vstack([np.eye(arm.nv), still[0]])]
+        damping = (taus[-1] - np.array(taus[:-1])).T / speed  # K_v (M + D)
+        rates = np.linalg.eigvals(np.linalg.solve(arm.mass_matrix(q), damping)).real
+        assert rates.min() > 0.9 * TRACKING_GAINS.velocity
+        assert period * rates.max() < 1.5  # a damping that is held for a period bears 2
 
 
 def test_another_goal_distance_gives_another_torque(
