@@ -1,6 +1,5 @@
 """DensityTracking: its one kernel is the law of its parts, whichever pairs are queried."""
 
-import math
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -30,7 +29,6 @@ from densarm.scenarios.scenario import Scenario
 from densarm.scene.scene import Scene
 from densarm.values.arrays import Array
 from densarm.world.active_pairs import ActivePairs
-from densarm.world.stopping import HELD_SHARE
 from densarm.world.swept_check import SweptCheck
 from densarm.world.world import World
 
