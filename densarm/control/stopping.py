@@ -28,7 +28,7 @@ class StopAndHold:
         \tau = H - M \big( K_p (q \ominus q_{rest}) + K_v \dot q \big) - \hat d,
 
     t the time since it began and T as in `StoppingTrajectory`; torques and accelerations are
-    within the limits, and the torque's rate too once the arm holds. d̂ is what the model does not
+    within the limits, and the torque's rate too while the arm holds. d̂ is what the model does not
     explain, by a `DisturbanceObserver`, so that the arm does not sag under a load that is not told.
     Where gravity asks for more torque than there is, the arm cannot be held. The period is the time
     between two calls [s].
@@ -75,12 +75,15 @@ class StopAndHold:
         """Return the torque (nv,) [N·m or N] at q (nq,) and v (nv,), dt [s] after the last call."""
         self._time, self._time_left = self._time + dt, self._time_left - dt
         self._dynamics.update(self._time, q, v)
-        if self._rest is None and np.abs(v).max() <= _REST:
+        is_braking = self._rest is None
+        if is_braking and np.abs(v).max() <= _REST:
             self._rest = q.copy()
         if self._rest is not None:
             error = self._arm.difference(self._rest, q)
             brake, attract = -self._gains.velocity * v, -self._gains.position * error
-            return self._dynamics.send(self._dynamics.torque(brake, attract))
+            # The torque of the brake would push a resting arm on: it ends at once.
+            tau = self._dynamics.torque(brake, attract)
+            return self._dynamics.send(tau, is_emergency=is_braking)
         tau = self._dynamics.brake_torque(v, self._time_left, self._shortest)
         return self._dynamics.send(tau, is_emergency=True)
 

@@ -94,7 +94,7 @@ def test_energy_falls_beside_an_obstacle(swing_up: Scenario) -> None:
     states = unlimited_run(near, 300)
     free = unlimited_run(regulation(swing_up), 1)
     assert not np.allclose(states[2][0], free[2][0])  # the obstacle is sensed
-    result = record_energy(near.task, density_of(near), near.gains, *states)
+    result = record_energy(near.task, density_of(near), near.law_gains, *states)
     assert result.verdict == EnergyVerdict.HOLDS
 
 

@@ -68,7 +68,8 @@ def test_it_stops_on_a_straight_line_in_the_time_of_the_trajectory_and_holds(
 
 def test_a_second_stop_remembers_no_disturbance_of_the_first() -> None:
     stop, ways = StopAndHold(ARM, Gains(), DT), []
-    for v in (REST, np.array([1.0, -1.0]), np.array([1.0, -1.0])):
+    for speed in (REST, np.array([1.0, -1.0]), np.array([1.0, -1.0])):
+        v = speed
         q, start = ARM.configuration([0.3, -0.2]), ARM.configuration([0.3, -0.2])
         stop.begin(q, v)
         for k in range(400):
@@ -78,6 +79,21 @@ def test_a_second_stop_remembers_no_disturbance_of_the_first() -> None:
             assert (change <= ARM.limits.acceleration * (1.0 + 1e-6)).all()
         ways.append(ARM.difference(start, q))
     np.testing.assert_allclose(ways[2], ways[1], rtol=0, atol=1e-4)
+
+
+def test_a_brake_ends_at_once_whatever_torque_rate_the_arm_has() -> None:
+    """Else its last torque would push the resting arm on, and off."""
+    arm = load_arm("panda")
+    stop, q, v = StopAndHold(arm, Gains(), 0.001), arm.postures["ready"], np.full(7, 0.8)
+    stop.begin(q, v)
+    for k in range(400):
+        tau, before = stop.torque(q, v, 0.001 if k else 0.0), v
+        v = v + 0.001 * pin.aba(arm.model, arm.data, q, v, tau)
+        q = arm.integrate(q, 0.001 * v)
+        change = np.abs(v - before) / 0.001
+        assert (change <= arm.limits.acceleration * (1.0 + 1e-6)).all()
+    assert stop.is_holding
+    assert np.abs(v).max() < 1e-4
 
 
 def test_a_gentle_stop_ends_in_damping() -> None:

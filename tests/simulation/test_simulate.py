@@ -359,7 +359,7 @@ class Rubbing(PinocchioPlant):
     """A plant of one's own, with viscous friction that no model tells of."""
 
     def step(self, q: Array, v: Array, u: Array) -> tuple[Array, Array]:
-        return super().step(q, v, u - 0.1 * v)
+        return super().step(q, v, u - 2.0 * v)
 
 
 def test_an_own_plant_with_friction_is_driven_and_told_from_the_model(swing_up: Scenario) -> None:
