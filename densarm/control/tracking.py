@@ -18,6 +18,7 @@ from densarm.control.inverse_dynamics import (
     ATTRACT,
     BRAKE,
     EFFORT_LIMIT,
+    RATE_LIMIT,
     TORQUE,
     VELOCITY_LIMIT,
     InverseDynamics,
@@ -65,8 +66,9 @@ class DensityTracking:
     [ZNV] has ∇ρ(e), singular at e = 0; this feedback tends to -K_p e there, and obstacles act at q,
     where they are. It is added for an arm that is not its model: D and d̂ (`ActuationParameters`),
     φ, which asks for no more than the torque rate can follow, and each joint saturates by itself.
-    The attraction is at most K_v times the velocity limit, so that no push is answered by a return
-    faster than that. Every sensing distance is below what the motion keeps from the unsafe set, so
+    The attraction is at most K_v times a quarter of the velocity limit, so that no push is answered
+    by a return faster than that. The torque's rate is limited, but after a push by more than 0.5
+    rad/s until the arm is back within 0.05 rad. Every sensing distance is below what the motion keeps from the unsafe set, so
     that Ψ = 1 on it and obstacles act only on an arm that was pushed off it; those that move, of
     which the motion knows nothing, act from the largest sensing distance on. The torque is taken to
     be held for the motion's period: q̈_d is its mean over that time. State and reference are those
@@ -162,6 +164,7 @@ class DensityTracking:
         begins, elapsed = dynamics.begins(t), dynamics.update(t, q, v)
         if begins:
             numbers[_LAG : _CHANGE + 1] = 0.0, 1.0, 0.0
+            numbers[_EMERGENCY] = 0.0
         else:
             numbers[_LAG] += (1.0 - numbers[_RATE]) * elapsed
         numbers[_TIME], numbers[_ELAPSED] = t - numbers[_LAG], elapsed
@@ -285,12 +288,15 @@ _POSITION, _VELOCITY, _ACCELERATION, _ERROR, _WEIGHTS = 0, 1, 2, 3, 4  # rows of
 
 # Numbers of the kernel: the reference's time σ, how far it is behind, and its derivatives.
 _TIME, _LAG, _RATE, _CHANGE, _ELAPSED, _LOG_PSI = 0, 1, 2, 3, 4, 5
-_PERIOD, _DELAY, _KAPPA, _POSITION_GAIN, _VELOCITY_GAIN, _N_NUMBERS = 6, 7, 8, 9, 10, 11
+_EMERGENCY, _PERIOD, _DELAY, _KAPPA, _POSITION_GAIN, _VELOCITY_GAIN = 6, 7, 8, 9, 10, 11
+_N_NUMBERS = 12
 
 _CLOCK_RATE = 20.0  # ω [1/s]
 _WAITING_ERROR, _FREE_ERROR = 0.03, 0.005  # ε, and what the reference does not wait for [rad or m]
 _FREE_LOAD = 0.05  # of the torque left, which unknown torque may take without slowing the reference
 _LEAST_SHARE = 0.1  # of torque that counts as left
+_RETURN_SHARE = 0.25  # of the velocity limits, at which an arm returns from a push
+_PUSHED, _RETURNED = 0.5, 0.05  # velocity off by a push [rad/s or m/s], error after it [rad or m]
 _LARGEST_GAIN = 0.4  # of K_v times the time that a torque is late
 
 
@@ -316,11 +322,13 @@ def _tracking_torque(
     u = (numbers[_TIME] + rate * numbers[_DELAY]) / period
     write_sample(u, u + 0.5 * rate * elapsed / period, period, knots, sample)
     error, attract, largest, left, n = sample[_ERROR], rows[ATTRACT], 0.0, 1.0, nonlinear.size
+    fastest = 0.0
     for i in range(n):
         off = rows[AHEAD_ANGLE, i] - sample[_POSITION, i]
         if joint_index[1, i]:
             off -= 2.0 * math.pi * math.floor(off / (2.0 * math.pi) + 0.5)
         error[i], largest = off, max(largest, abs(off))
+        fastest = max(fastest, abs(rows[AHEAD_VELOCITY, i] - rate * sample[_VELOCITY, i]))
         limit = rows[EFFORT_LIMIT, i]
         room = max(limit - abs(nonlinear[i]), _LEAST_SHARE * limit)
         left = min(left, 1.0 + _FREE_LOAD - abs(rows[DISTURBANCE, i]) / room)
@@ -333,10 +341,15 @@ def _tracking_torque(
     weaker = min(1.0, _LARGEST_GAIN / (numbers[_VELOCITY_GAIN] * late))
     stiffness, damping = numbers[_POSITION_GAIN] * weaker**2, numbers[_VELOCITY_GAIN] * weaker
     for i in range(n):
-        velocity, most = sample[_VELOCITY, i], damping * rows[VELOCITY_LIMIT, i]
+        velocity, most = sample[_VELOCITY, i], damping * _RETURN_SHARE * rows[VELOCITY_LIMIT, i]
         pull = min(max(stiffness * attract[i], -most), most)
         attract[i] = pull - damping * (rows[AHEAD_VELOCITY, i] - rate * velocity)
         rows[BRAKE, i] = rate * rate * sample[_ACCELERATION, i] + numbers[_CHANGE] * velocity
+    if fastest > _PUSHED or largest < _RETURNED:
+        numbers[_EMERGENCY] = fastest > _PUSHED
+    if numbers[_EMERGENCY] > 0.0:
+        for i in range(n):
+            rows[RATE_LIMIT, i] = math.inf
     robust_torque(mass, nonlinear, damping, elapsed, late, rows)
     send(gravity, rows, sent)
     waiting = max(largest - _FREE_ERROR, 0.0) / _WAITING_ERROR
