@@ -14,7 +14,7 @@ Errors are medians over the runs: the largest off the motion, and that left at t
 
 import argparse
 import json
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -87,7 +87,7 @@ def torque_rate(run: densarm.Run) -> float:
 
 
 def ended_at_goal(run: densarm.Run) -> bool:
-    """Whether a run ended at its goal and slow, touching nothing, however long it has been there."""
+    """Whether a run ended at its goal and slow, touching nothing."""
     is_slow = float(np.abs(run.v[-1]).max()) <= REACHED_VELOCITY
     return run.outcome != Outcome.COLLIDED and is_slow and run.goal_error <= REACHED_POSITION
 
@@ -166,6 +166,7 @@ def run_cases(
     scenario = densarm.load_scenario(known) if isinstance(known, str) else scenario_of(known)
     world, law = scenario.world, dict[str, Any](margin=scenario.control.margin, seed=scenario.seed)
     motion, moves = None, LONGEST
+    make: Callable[[float], densarm.Controller]
     if form == "tracking":
         motion = densarm.plan_motion(world, scenario.start, scenario.goal, **law)
         make, moves = partial(Tracking, world, motion), motion.duration

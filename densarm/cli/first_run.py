@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from densarm.planning.guide import GuidePath
@@ -70,7 +70,8 @@ class _Stay:
 def _is_compiled() -> bool:
     from densarm.control.tracking import _tracking_torque
 
-    folder = Path(_tracking_torque.stats.cache_path or "")
+    kernel: Any = _tracking_torque
+    folder = Path(kernel.stats.cache_path or "")
     return any(folder.glob("tracking._tracking_torque-*.nbi"))
 
 

@@ -68,11 +68,11 @@ class DensityTracking:
     φ, which asks for no more than the torque rate can follow, and each joint saturates by itself.
     The attraction is at most K_v times a quarter of the velocity limit, so that no push is answered
     by a return faster than that. The torque's rate is limited, but after a push by more than 0.5
-    rad/s until the arm is back within 0.05 rad. Every sensing distance is below what the motion keeps from the unsafe set, so
-    that Ψ = 1 on it and obstacles act only on an arm that was pushed off it; those that move, of
-    which the motion knows nothing, act from the largest sensing distance on. The torque is taken to
-    be held for the motion's period: q̈_d is its mean over that time. State and reference are those
-    of the time when it acts.
+    rad/s until the arm is back within 0.05 rad. Every sensing distance is below what the motion
+    keeps from the unsafe set, so that Ψ = 1 on it and obstacles act only on an arm that was pushed
+    off it; those that move, of which the motion knows nothing, act from the largest sensing
+    distance on. The torque is taken to be held for the motion's period: q̈_d is its mean over that
+    time. State and reference are those of the time when it acts.
 
     The reference waits for an arm that is held up: its time σ runs by
 

@@ -1,18 +1,43 @@
 """The one way in which numerical kernels are compiled, and how a caller hears of it."""
 
+import hashlib
 import time
 from collections.abc import Callable
 from contextlib import AbstractContextManager
-from typing import TYPE_CHECKING
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeVar, cast
 
 import numba
 from numba.core import event
 
-compiled = numba.njit(cache=True, error_model="numpy")
-"""Decorator of kernels: compile at the first call, and keep the code on disk.
+_Function = TypeVar("_Function", bound=Callable[..., Any])
 
-Division follows IEEE 754 instead of raising. The Python function stays reachable as `py_func`.
-"""
+
+def _kernels_text() -> str:
+    """Return a digest of all files with kernels or parts of them."""
+    digest = hashlib.sha256()
+    for path in sorted(Path(__file__).parents[1].rglob("*.py")):
+        if b"kernels import" in (text := path.read_bytes()):
+            digest.update(text)
+    return digest.hexdigest()
+
+
+_KERNELS_TEXT = _kernels_text()
+
+
+def compiled(function: _Function) -> _Function:
+    """Compile a kernel at its first call, and keep the code on disk.
+
+    Division follows IEEE 754 instead of raising. The Python function stays reachable as `py_func`.
+    Numba keeps code until the kernel's own file changes; here until any does that it may be made
+    of, since a kernel with constants or parts of another version would compute something else.
+    """
+    kernel: Any = numba.njit(cache=True, error_model="numpy")(function)
+    if cache := getattr(kernel, "_cache", None):  # none where compiling is switched off
+        file = cache._cache_file
+        file._source_stamp = (file._source_stamp, _KERNELS_TEXT)
+    return cast(_Function, kernel)
+
 
 if TYPE_CHECKING:  # numba's stubs do not know the options
     compiled_part = compiled

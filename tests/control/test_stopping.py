@@ -73,9 +73,8 @@ def test_a_second_stop_remembers_no_disturbance_of_the_first() -> None:
         q, start = ARM.configuration([0.3, -0.2]), ARM.configuration([0.3, -0.2])
         stop.begin(q, v)
         for k in range(400):
-            before = v
-            q, v = step(ARM, q, v, stop.torque(q, v, DT if k else 0.0))
-            change = np.abs(v - before) / DT
+            q, v_next = step(ARM, q, v, stop.torque(q, v, DT if k else 0.0))
+            change, v = np.abs(v_next - v) / DT, v_next
             assert (change <= ARM.limits.acceleration * (1.0 + 1e-6)).all()
         ways.append(ARM.difference(start, q))
     np.testing.assert_allclose(ways[2], ways[1], rtol=0, atol=1e-4)
