@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from densarm.planning.guide import GuidePath
@@ -70,8 +70,7 @@ class _Stay:
 def _is_compiled() -> bool:
     from densarm.control.tracking import _tracking_torque
 
-    kernel: Any = _tracking_torque
-    folder = Path(kernel.stats.cache_path or "")
+    folder = Path(_tracking_torque.stats.cache_path or "")
     return any(folder.glob("tracking._tracking_torque-*.nbi"))
 
 

@@ -158,18 +158,17 @@ def _observe(  # noqa: C901  # one kernel, since every call has its cost
     dt, delay, size, nv = numbers[0], numbers[2], sent.shape[0], v.size
     angle, velocity, disturbance = rows[ANGLE], rows[VELOCITY], rows[DISTURBANCE]
     acceleration, innovation = rows[_ACCELERATION], rows[_INNOVATION]
-    if dt == 0.0:
-        return
     _factorise(mass, factor)
     _write_free_inertia(factor, acceleration, rows[FREE_INERTIA])
-    if dt < 0.0:
+    if dt <= 0.0:
         for i in range(nv):
-            angle[i], velocity[i], disturbance[i] = _position(q, joint_index, i), v[i], 0.0
+            angle[i], velocity[i] = _position(q, joint_index, i), v[i]
             rows[AHEAD_ANGLE, i], rows[AHEAD_VELOCITY, i] = angle[i], velocity[i]
-            rows[_NONLINEAR, i] = nonlinear[i]
-            for k in range(size):
-                sent[k, i] = gravity[i]
-            rows[_GRAVITY, i], rows[FREE, i] = gravity[i], 0.0
+            if dt < 0.0:
+                rows[_NONLINEAR, i], disturbance[i] = nonlinear[i], 0.0
+                for k in range(size):
+                    sent[k, i] = gravity[i]
+                rows[_GRAVITY, i], rows[FREE, i] = gravity[i], 0.0
         return
     acting = size - 1 - min(int(delay / dt + 0.5), size - 1)
     pole = math.exp(-min(numbers[1], 1.0 / (dt + delay)) * dt)

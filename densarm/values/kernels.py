@@ -5,12 +5,10 @@ import time
 from collections.abc import Callable
 from contextlib import AbstractContextManager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar, cast
+from typing import TYPE_CHECKING
 
 import numba
 from numba.core import event
-
-_Function = TypeVar("_Function", bound=Callable[..., Any])
 
 
 def _kernels_text() -> str:
@@ -25,25 +23,26 @@ def _kernels_text() -> str:
 _KERNELS_TEXT = _kernels_text()
 
 
-def compiled(function: _Function) -> _Function:
-    """Compile a kernel at its first call, and keep the code on disk.
-
-    Division follows IEEE 754 instead of raising. The Python function stays reachable as `py_func`.
-    Numba keeps code until the kernel's own file changes; here until any does that it may be made
-    of, since a kernel with constants or parts of another version would compute something else.
-    """
-    kernel: Any = numba.njit(cache=True, error_model="numpy")(function)
-    if cache := getattr(kernel, "_cache", None):  # none where compiling is switched off
-        file = cache._cache_file
-        file._source_stamp = (file._source_stamp, _KERNELS_TEXT)
-    return cast(_Function, kernel)
-
-
 if TYPE_CHECKING:  # numba's stubs do not know the options
-    compiled_part = compiled
+    compiled = compiled_part = numba.njit(cache=True, error_model="numpy")
 else:
+
+    def compiled(function):
+        """Compile a kernel at its first call, and keep the code on disk.
+
+        Division follows IEEE 754 instead of raising. The Python function stays reachable as
+        `py_func`. Numba keeps code until the kernel's own file changes; here until any does that it
+        may be made of, since a kernel with constants or parts of another version would compute
+        something else.
+        """
+        kernel = numba.njit(cache=True, error_model="numpy")(function)
+        if cache := getattr(kernel, "_cache", None):  # none where compiling is switched off
+            file = cache._cache_file
+            file._source_stamp = (file._source_stamp, _KERNELS_TEXT)
+        return kernel
+
     compiled_part = numba.njit(error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)
-"""Decorator of functions that kernels alone call: they are compiled into them.
+"""`compiled_part` is the decorator of functions that kernels alone call, and are compiled into.
 
 Without an entry from Python, and without a file of its own, a part takes less time to compile.
 """

@@ -222,7 +222,7 @@ class ChangingObstacles:
         for slot, obstacle in zip(slots, new, strict=True):
             self._occupy(slot, obstacle)
         for name, slot in staying.items():
-            if slot.obstacle != wanted[name]:
+            if slot.present() != wanted[name]:
                 self._fill(slot, wanted[name])
 
     def _moving_slots(self) -> list[PlacedObstacle]:

@@ -16,7 +16,7 @@ from densarm.errors import InvalidValueError
 from densarm.values.arrays import Array
 
 DT = 0.001  # [s]
-USUAL = ActuationParameters()
+USUAL = ActuationParameters(velocity_noise=0.0)
 
 
 @pytest.fixture(scope="module", params=["two_link", "panda"])
@@ -67,7 +67,7 @@ def test_a_constant_torque_is_found_within_time_constants(
         arm,
         arm.configuration(angles[:nv]),
         speed[:nv],
-        ActuationParameters(bandwidth=bandwidth),
+        ActuationParameters(bandwidth=bandwidth, velocity_noise=0.0),
     )
     loop.run(10.0 / bandwidth, d)
     np.testing.assert_allclose(loop.dynamics.disturbance, d, rtol=0.01, atol=0.02)
@@ -93,7 +93,7 @@ def test_without_bandwidth_the_state_is_the_measured_one(arm: Arm) -> None:
 @pytest.mark.parametrize("late", [2, 5])
 def test_where_a_declared_delay_leads_is_foreseen(arm: Arm, late: int) -> None:
     """From the torques on their way; nothing of the delay is taken for a disturbance."""
-    declared = ActuationParameters(delay=late * DT)
+    declared = ActuationParameters(delay=late * DT, velocity_noise=0.0)
     q, v = arm.configuration(np.full(arm.nv, -0.4)), np.full(arm.nv, 0.5)
     loop = Damped(arm, q, v, declared, late)
     loop.run(0.1, np.zeros(arm.nv))

@@ -137,7 +137,7 @@ def test_any_rate(
 def test_the_reference_waits_for_an_arm_that_is_pushed(world: World, make: MakeController) -> None:
     pushed, free = make(), make()
     duration = pushed.motion.duration
-    push = Push(0.5 * duration, "panda_joint2", 1.0)
+    push = Push(0.5 * duration, "panda_joint2", 2.0)
     runs = [driven(world, free), driven(world, pushed, pushes=(push,))]
     assert [run.outcome for run in runs] == [Outcome.REACHED] * 2
     assert not pushed.is_moving

@@ -78,7 +78,7 @@ def test_torque_is_that_of_its_parts(
         point = panda_swing.sample(t, lead=0.5 * panda_swing.period)
         density.set_goal(panda.configuration(point.position))
         pull = GAINS.position * density.evaluate(q).gradient(Gauge.RECIPROCAL)
-        fastest = GAINS.velocity * limits.velocity
+        fastest = 0.25 * GAINS.velocity * limits.velocity
         feedback = np.clip(pull, -fastest, fastest) - GAINS.velocity * (v - point.velocity)
         mass = panda.mass_matrix(q)
         # D is less where a period is so long that K_v would make it unstable.

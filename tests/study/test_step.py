@@ -86,9 +86,8 @@ def test_full_sensing_leaves_the_spheres_and_feels_them_near_the_motion() -> Non
         for law in (controller, knowing):
             law.torque(t + 1.0, q, v)  # time runs back then: each state is the first that is known
             taus.append(law.torque(t, q, v))
-        differs.append(np.abs(taus[0] - taus[1]).max() > 1e-6)
-    assert any(differs)
-    assert not all(differs)
+        differs.append(np.abs(taus[0] - taus[1]).max())
+    assert min(differs) < 1e-3 < max(differs)
 
 
 @pytest.mark.slow

@@ -147,7 +147,7 @@ def test_reached_and_certified(swing_up_run: Run) -> None:
     summary = SummaryLine.of(swing_up_run)
     assert summary.words[0] == ("reached", True)
     assert summary.words[-1] == ("certified", True)
-    assert summary.detail == f"Led by {swing_up_run.led_by}"
+    assert summary.detail == f"Led by {swing_up_run.led_by}; {swing_up_run.remark}"
     assert summary.title == swing_up_run.task.title
 
 

@@ -23,7 +23,7 @@ STICK = Attachment(Box(name="stick", size=(0.5, 0.02, 0.02), position=(0, 0, 0.1
 ARMS: dict[str, Callable[[], Arm]] = {
     "two_link": lambda: load_arm("two_link"),
     "panda": lambda: load_arm("panda"),
-    "panda capsules": lambda: load_arm("panda", shapes="capsule"),
+    "panda capsules": lambda: load_arm("panda", shapes="capsule", torque_rate=np.inf),
     "panda with a stick": lambda: load_arm("panda").holding(STICK),
     "branching": lambda: load_arm(DATA / "branching.urdf"),
     "branching, placed": lambda: load_arm(DATA / "branching.urdf", base_placement=BASE),
