@@ -17,7 +17,8 @@ ANGLE, VELOCITY, DISTURBANCE, AHEAD_ANGLE, AHEAD_VELOCITY = 0, 1, 2, 3, 4
 FREE = 5  # the torque sent last, without the gravity then
 _NONLINEAR, _GRAVITY, _INNOVATION, _ACCELERATION, _LARGEST, _JITTER = 6, 7, 8, 9, 10, 11
 FREE_INERTIA = 12  # 1 / (M⁻¹)_ii, what a joint moves where the others give way
-N_ROWS = 13
+_MEASURED_ANGLE, _MEASURED_VELOCITY = 13, 14
+N_ROWS = 15
 
 _JITTER_SHARE = 0.0012  # of the torque limits, by which noise may move a disturbance in a period
 _TRUSTED_SHARE = 0.9  # of the torque limits, that a disturbance may be taken to have
@@ -160,9 +161,16 @@ def _observe(  # noqa: C901  # one kernel, since every call has its cost
     acceleration, innovation = rows[_ACCELERATION], rows[_INNOVATION]
     _factorise(mass, factor)
     _write_free_inertia(factor, acceleration, rows[FREE_INERTIA])
+    is_new = dt != 0.0
+    for i in range(nv):
+        position = _position(q, joint_index, i)
+        is_new |= position != rows[_MEASURED_ANGLE, i] or v[i] != rows[_MEASURED_VELOCITY, i]
+        rows[_MEASURED_ANGLE, i], rows[_MEASURED_VELOCITY, i] = position, v[i]
+    if not is_new:
+        return
     if dt <= 0.0:
         for i in range(nv):
-            angle[i], velocity[i] = _position(q, joint_index, i), v[i]
+            angle[i], velocity[i] = rows[_MEASURED_ANGLE, i], v[i]
             rows[AHEAD_ANGLE, i], rows[AHEAD_VELOCITY, i] = angle[i], velocity[i]
             if dt < 0.0:
                 rows[_NONLINEAR, i], disturbance[i] = nonlinear[i], 0.0
@@ -182,7 +190,7 @@ def _observe(  # noqa: C901  # one kernel, since every call has its cost
         velocity[i] = predicted + keep * (v[i] - predicted)
         innovation[i] = learn * learn / dt * (v[i] - predicted)
         angle[i] += dt * predicted
-        off = _position(q, joint_index, i) - angle[i]
+        off = rows[_MEASURED_ANGLE, i] - angle[i]
         if joint_index[1, i]:
             off -= 2.0 * math.pi * math.floor(off / (2.0 * math.pi) + 0.5)
         angle[i] += keep * off

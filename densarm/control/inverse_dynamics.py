@@ -74,7 +74,7 @@ class InverseDynamics:
     ) -> None:
         arm.require_masses("torque")
         self._arm = arm
-        self._period = period
+        self._period = self._elapsed = period
         self._updates_kinematics = kinematics is None
         self._kinematics = kinematics or Kinematics(arm)
         data = self._kinematics.data
@@ -107,9 +107,11 @@ class InverseDynamics:
         if self._updates_kinematics:
             kinematics.update(q)
         pin.nonLinearEffects(kinematics.model, kinematics.data, q, v)
-        if self._limits_rate or self._observer.begins(t):
+        if begins := self._observer.begins(t):
+            self._elapsed = self._period
+        if self._limits_rate or begins:
             pin.computeGeneralizedGravity(kinematics.model, kinematics.data, q)
-        elapsed = self._observer.update(t, q, v, *self.terms) or self._period
+        self._elapsed = elapsed = self._observer.update(t, q, v, *self.terms) or self._elapsed
         if self._limits_rate:
             rate = self._arm.limits.torque_rate
             self.rows[RATE_LIMIT] = math.inf if math.isnan(t) else elapsed * rate

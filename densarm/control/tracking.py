@@ -145,6 +145,7 @@ class DensityTracking:
         kappa = distance.kappa if isinstance(distance, TorusDistance) else math.nan
         constants = motion.period, actuation.delay, kappa, gains.position, gains.velocity
         self._numbers[_PERIOD:] = constants
+        self._time, self._clock = math.nan, self._numbers[_CLOCK].copy()
         self._sample = np.zeros((5, arm.nv))
         self._sample[_WEIGHTS] = getattr(distance, "weights", 1.0)
         for t in (0.0, motion.period, math.nan):  # kernels are loaded before a control loop
@@ -163,10 +164,12 @@ class DensityTracking:
         numbers, dynamics = self._numbers, self._dynamics
         begins, elapsed = dynamics.begins(t), dynamics.update(t, q, v)
         if begins:
-            numbers[_LAG : _CHANGE + 1] = 0.0, 1.0, 0.0
-            numbers[_EMERGENCY] = 0.0
+            numbers[_CLOCK] = 0.0, 1.0, 0.0, 0.0
+        elif t == self._time:  # asked again, which moves no clock
+            numbers[_CLOCK] = self._clock
         else:
             numbers[_LAG] += (1.0 - numbers[_RATE]) * elapsed
+        self._time, self._clock = t, numbers[_CLOCK].copy()
         numbers[_TIME], numbers[_ELAPSED] = t - numbers[_LAG], elapsed
         if math.isnan(numbers[_KAPPA]):
             dynamics.rows[ATTRACT] = self._attraction(q, self._ahead().position)
@@ -287,8 +290,9 @@ def _worth_sensing(wanted: Array, least: float, most: float) -> Array:
 _POSITION, _VELOCITY, _ACCELERATION, _ERROR, _WEIGHTS = 0, 1, 2, 3, 4  # rows of a sample
 
 # Numbers of the kernel: the reference's time σ, how far it is behind, and its derivatives.
-_TIME, _LAG, _RATE, _CHANGE, _ELAPSED, _LOG_PSI = 0, 1, 2, 3, 4, 5
-_EMERGENCY, _PERIOD, _DELAY, _KAPPA, _POSITION_GAIN, _VELOCITY_GAIN = 6, 7, 8, 9, 10, 11
+_TIME, _LAG, _RATE, _CHANGE, _EMERGENCY, _ELAPSED = 0, 1, 2, 3, 4, 5
+_CLOCK = slice(_LAG, _EMERGENCY + 1)
+_LOG_PSI, _PERIOD, _DELAY, _KAPPA, _POSITION_GAIN, _VELOCITY_GAIN = 6, 7, 8, 9, 10, 11
 _N_NUMBERS = 12
 
 _CLOCK_RATE = 20.0  # ω [1/s]

@@ -34,8 +34,8 @@ SOFT = Gains(position=25.0, velocity=10.0)
 
 
 def regulation(swing_up: Scenario, *obstacles: Obstacle, **simulation: Any) -> Scenario:
-    """A soft motion to hanging of an arm whose acceleration has no limit to speak of."""
-    arm = Arm(replace(swing_up.arm.description, acceleration=(1e4, 1e4)))
+    """A soft motion to hanging of an arm without limits of acceleration and rates to speak of."""
+    arm = Arm(replace(swing_up.arm.description, acceleration=(1e4, 1e4), torque_rate=np.inf))
     return replace(
         swing_up,
         arm=arm,

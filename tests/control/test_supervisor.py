@@ -99,7 +99,7 @@ def test_without_a_fault_it_is_the_controller_bit_for_bit(
     setting: Setting, tolerances: Tolerances | None
 ) -> None:
     loop = Loop(setting, tolerances)
-    for _ in range(2500):
+    for _ in range(2800):
         expected = loop.inner.torque(loop.k * DT, loop.q, loop.v)
         loop.run(DT)
         np.testing.assert_array_equal(loop.tau, expected)

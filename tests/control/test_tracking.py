@@ -99,7 +99,8 @@ def test_the_formula_of_the_readme_is_the_one_that_runs(
 ) -> None:
     readme = (Path(__file__).parents[2] / "README.md").read_text(encoding="utf-8")
     assert "τ = H + M (q̈_d + K_p ∇(−1/ρ) − K_v ė)" in readme
-    arm, world, motion = swing_up.arm, World(swing_up.arm, swing_up.scene), swing_up_motion
+    arm, motion = load_arm("two_link", torque_rate=np.inf), swing_up_motion
+    world = World(arm, swing_up.scene)
     controller = DensityTracking(world, motion, gains=GAINS, actuation=TRUSTED)
     density = tracked_density(world, motion)
     for t, q, v in states(arm, motion, off=3e-4, every=200):
