@@ -20,8 +20,8 @@ from densarm.values.kernels import compiled
 class Tolerances:
     """How far state and clock may be off before a supervisor stops the arm.
 
-    A model whose accelerations are wrong by δa lets the observed velocity lag by δa · `memory`
-    and the position by δa · `memory`²: the defaults allow 4 rad/s².
+    A model whose accelerations come to be wrong by δa at once lets the observed velocity lag by
+    δa · `memory` / e: the defaults allow 100 rad/s², Coulomb friction of 1 N·m in a wrist.
 
     Raises:
         InvalidValueError: a value that is not positive.
@@ -29,12 +29,13 @@ class Tolerances:
 
     position: float = 0.0025
     """Largest difference of a joint from where the dynamics put it [rad or m]."""
-    velocity: float = 0.1
+    velocity: float = 0.4
     """Largest difference of its velocity [rad/s or m/s]."""
-    memory: float = 0.025
+    memory: float = 0.01
     """Time in which the observed state forgets such a difference [s]."""
     tracking: float = 0.02
-    """Largest distance of a joint from the controller's reference, if it has one [rad or m]."""
+    """Largest distance of a joint from the controller's reference, if it has one [rad or m]; the
+    motion's tube where that is wider."""
     gap: float = 0.005
     """Longest time between two calls [s]; at least one and a half periods."""
     delay: float = 0.05
@@ -50,27 +51,36 @@ class StateObserver:
 
     .. math::
 
-        \dot{\hat v} = M^{-1} (\tau - H) + (v - \hat v) / T, \qquad
-        \dot{\hat q} = \hat v + (q \ominus \hat q) / T
+        \hat v^- = \hat v + \Delta t\, (M^{-1} (\tau - H) + \hat a), \quad r = v - \hat v^-, \quad
+        \hat v = \hat v^- + (1 - \lambda^2)\, r, \quad
+        \hat a \mathrel{+}= \frac{(1 - \lambda)^2}{\Delta t} r, \quad \lambda = e^{-\Delta t / T}
 
-    A measurement agrees if each joint's differences are within the tolerances. One that does not
-    is left out: the observed state then follows the dynamics alone.
+    and q̂ as v̂; â is what the model does not explain, as `DisturbanceObserver` has it as a torque,
+    so that a wrong model does not look like a jump. A measurement agrees if each joint's
+    differences are within the tolerances. One that does not is left out: the observed state then
+    follows dynamics and â alone.
 
     Args:
         arm: its dynamics.
         fastest: bound on the observed velocity (nv,) [rad/s or m/s].
         tolerances: T is their `memory`.
+        learns: whether â is observed, or what it was set to.
 
     Source: D. G. Luenberger, An introduction to observers, IEEE TAC 1971.
     """
 
-    def __init__(self, arm: Arm, fastest: Array, tolerances: Tolerances) -> None:
+    def __init__(
+        self, arm: Arm, fastest: Array, tolerances: Tolerances, *, learns: bool = True
+    ) -> None:
         self._arm = arm
         self._data = arm.model.createData()
         self._tolerances = tolerances
         self._fastest = fastest
         self._joint_index = arm.joint_index
         self._angles, self._off = np.zeros((2, arm.nv))
+        self._learns = learns
+        self.unexplained: Array = np.zeros(arm.nv)
+        """â (nv,) [rad/s² or m/s²]."""
         self.q: Array = arm.configurations(self._angles)
         """Observed configuration (nq,), overwritten by the next call."""
         self.v: Array = np.zeros(arm.nv)
@@ -87,7 +97,7 @@ class StateObserver:
         """Follow the dynamics for a time [s] by steps [s] of at most so long, tau (nv,) held."""
         n = max(math.ceil(time / step - 1e-6), 1)
         for _ in range(n):
-            a = pin.aba(self._arm.model, self._data, self.q, self.v, tau)
+            a = pin.aba(self._arm.model, self._data, self.q, self.v, tau) + self.unexplained
             _advance(time / n, a, self._fastest, self._joint_index, self._angles, self.v, self.q)
 
     def agrees(self, q: Array, v: Array, time: float) -> bool:
@@ -96,9 +106,10 @@ class StateObserver:
         The time is that since the last measurement [s], zero for one that tells nothing new.
         """
         position, velocity = self._tolerances.position, self._tolerances.velocity
-        share, index = min(time / self._tolerances.memory, 1.0), self._joint_index
-        observed = self._angles, self.v, self.q, self._off
-        return _draw(q, v, share, position, velocity, index, *observed)
+        share, index = time / self._tolerances.memory, self._joint_index
+        observed = self._angles, self.v, self.q, self._off, self.unexplained
+        time = time if self._learns else 0.0
+        return _draw(q, v, time, share, position, velocity, index, *observed)
 
 
 @compiled
@@ -124,6 +135,7 @@ def _advance(
 def _draw(
     q: Array,
     v: Array,
+    time: float,
     share: float,
     position: float,
     velocity: float,
@@ -132,13 +144,19 @@ def _draw(
     v_observed: Array,
     q_observed: Array,
     off: Array,
+    unexplained: Array,
 ) -> bool:
     joint_error(q_observed, q, joint_index, off)
     for i in range(v.size):
         if abs(off[i]) > position or abs(v[i] - v_observed[i]) > velocity:
             return False
+    learn = 1.0 - math.exp(-share)
+    keep = learn * (2.0 - learn)
     for i in range(v.size):
-        angles[i] += share * off[i]
-        v_observed[i] += share * (v[i] - v_observed[i])
+        r = v[i] - v_observed[i]
+        angles[i] += keep * off[i]
+        v_observed[i] += keep * r
+        if time > 0.0:
+            unexplained[i] += learn * learn / time * r
     write_configuration(angles, joint_index, q_observed)
     return True
