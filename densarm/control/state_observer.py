@@ -51,36 +51,38 @@ class StateObserver:
 
     .. math::
 
-        \hat v^- = \hat v + \Delta t\, (M^{-1} (\tau - H) + \hat a), \quad r = v - \hat v^-, \quad
-        \hat v = \hat v^- + (1 - \lambda^2)\, r, \quad
+        \hat v^- = \hat v + \Delta t\, \big( M^{-1} ((1 - \kappa) \tau - H) + \hat a \big), \quad
+        r = v - \hat v^-, \quad \hat v = \hat v^- + (1 - \lambda^2)\, r, \quad
         \hat a \mathrel{+}= \frac{(1 - \lambda)^2}{\Delta t} r, \quad \lambda = e^{-\Delta t / T}
 
-    and q̂ as v̂; â is what the model does not explain, as `DisturbanceObserver` has it as a torque,
-    so that a wrong model does not look like a jump. A measurement agrees if each joint's
-    differences are within the tolerances. One that does not is left out: the observed state then
-    follows dynamics and â alone.
+    and q̂ as v̂. κ and â are what the model does not explain, so that a wrong model does not look
+    like a jump: κ, as if all masses were wrong alike, takes from â over 30 ms what it can, for it
+    holds while the arm stops too. A measurement agrees if each joint's differences are within the
+    tolerances. One that does not is left out: the observed state then follows the dynamics alone.
 
     Args:
         arm: its dynamics.
         fastest: bound on the observed velocity (nv,) [rad/s or m/s].
         tolerances: T is their `memory`.
-        learns: whether â is observed, or what it was set to.
 
-    Source: D. G. Luenberger, An introduction to observers, IEEE TAC 1971.
+    Attributes:
+        learns: whether κ and â are observed. Else they stay, and the tolerances are stricter: a
+            late state is not to be explained by them.
+
+    Source: D. G. Luenberger, An introduction to observers, IEEE TAC 1971; J. Han, as in
+        `DisturbanceObserver`.
     """
 
-    def __init__(
-        self, arm: Arm, fastest: Array, tolerances: Tolerances, *, learns: bool = True
-    ) -> None:
+    def __init__(self, arm: Arm, fastest: Array, tolerances: Tolerances) -> None:
         self._arm = arm
         self._data = arm.model.createData()
         self._tolerances = tolerances
         self._fastest = fastest
         self._joint_index = arm.joint_index
-        self._angles, self._off = np.zeros((2, arm.nv))
-        self._learns = learns
-        self.unexplained: Array = np.zeros(arm.nv)
-        """â (nv,) [rad/s² or m/s²]."""
+        self.learns = True
+        self._angles, self._off, self._none = np.zeros((3, arm.nv))
+        # Rows: â, τ and M⁻¹ τ; then κ alone.
+        self._unexplained = np.zeros((4, arm.nv))
         self.q: Array = arm.configurations(self._angles)
         """Observed configuration (nq,), overwritten by the next call."""
         self.v: Array = np.zeros(arm.nv)
@@ -93,11 +95,19 @@ class StateObserver:
         """Begin at a state, q (nq,) and v (nv,)."""
         self.q[:], self.v[:], self._angles[:] = q, v, self._arm.angles(q)
 
+    def believe(self, other: "StateObserver") -> None:
+        """Take over what another found that the model does not explain."""
+        self._unexplained[:] = other._unexplained
+
     def advance(self, time: float, step: float, tau: Array) -> None:
         """Follow the dynamics for a time [s] by steps [s] of at most so long, tau (nv,) held."""
+        model, data, known = self._arm.model, self._data, self._unexplained
         n = max(math.ceil(time / step - 1e-6), 1)
         for _ in range(n):
-            a = pin.aba(self._arm.model, self._data, self.q, self.v, tau) + self.unexplained
+            free = np.array(pin.aba(model, data, self.q, self.v, self._none))
+            a = pin.aba(model, data, self.q, self.v, tau)
+            known[_TORQUE], known[_PUSH] = tau, a - free
+            a = a + known[_UNEXPLAINED] - known[_SCALE, 0] * known[_PUSH]
             _advance(time / n, a, self._fastest, self._joint_index, self._angles, self.v, self.q)
 
     def agrees(self, q: Array, v: Array, time: float) -> bool:
@@ -105,11 +115,26 @@ class StateObserver:
 
         The time is that since the last measurement [s], zero for one that tells nothing new.
         """
-        position, velocity = self._tolerances.position, self._tolerances.velocity
-        share, index = time / self._tolerances.memory, self._joint_index
-        observed = self._angles, self.v, self.q, self._off, self.unexplained
-        time = time if self._learns else 0.0
-        return _draw(q, v, time, share, position, velocity, index, *observed)
+        memory, velocity = self._tolerances.memory, self._tolerances.velocity
+        if not self.learns:
+            memory, velocity = _LATER_MEMORY * memory, _LATER_VELOCITY * velocity
+        return _draw(
+            q,
+            v,
+            np.array([time, memory, self._tolerances.position, velocity, float(self.learns)]),
+            self._joint_index,
+            self._angles,
+            self.v,
+            self.q,
+            self._off,
+            self._unexplained,
+        )
+
+
+_UNEXPLAINED, _TORQUE, _PUSH, _SCALE = 0, 1, 2, 3
+_LATER_MEMORY, _LATER_VELOCITY = 5.0, 0.25  # parts of the tolerances without learning
+_SCALE_TIME = 0.03  # [s]
+_LARGEST_SCALE = 0.5  # of κ
 
 
 @compiled
@@ -135,28 +160,36 @@ def _advance(
 def _draw(
     q: Array,
     v: Array,
-    time: float,
-    share: float,
-    position: float,
-    velocity: float,
+    numbers: Array,
     joint_index: NDArray[np.int64],
     angles: Array,
     v_observed: Array,
     q_observed: Array,
     off: Array,
-    unexplained: Array,
+    known: Array,
 ) -> bool:
+    time, memory, position, velocity, learns = numbers
     joint_error(q_observed, q, joint_index, off)
     for i in range(v.size):
         if abs(off[i]) > position or abs(v[i] - v_observed[i]) > velocity:
             return False
-    learn = 1.0 - math.exp(-share)
+    learn = 1.0 - math.exp(-time / memory)
     keep = learn * (2.0 - learn)
+    unexplained, tau, push = known[_UNEXPLAINED], known[_TORQUE], known[_PUSH]
+    explained, power = 0.0, 0.0
     for i in range(v.size):
         r = v[i] - v_observed[i]
         angles[i] += keep * off[i]
         v_observed[i] += keep * r
-        if time > 0.0:
+        if learns > 0.0 and time > 0.0:
             unexplained[i] += learn * learn / time * r
+        explained -= tau[i] * unexplained[i]
+        power += tau[i] * push[i]
+    if learns > 0.0 and power > 0.0:  # least squares in the metric M, as M⁻¹ τ is the push
+        scale = known[_SCALE, 0] + min(time / _SCALE_TIME, 1.0) * explained / power
+        scale = min(max(scale, -_LARGEST_SCALE), _LARGEST_SCALE)
+        for i in range(v.size):
+            unexplained[i] += (scale - known[_SCALE, 0]) * push[i]
+        known[_SCALE, 0] = scale
     write_configuration(angles, joint_index, q_observed)
     return True

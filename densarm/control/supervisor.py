@@ -1,7 +1,6 @@
 """Supervisor: lets a controller act while all is well, and else stops the arm and holds it."""
 
 import math
-from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
@@ -53,7 +52,7 @@ class Supervisor:
     Without any believable state the arm is held by the torque that the model's gravity asks for at
     the observed rest. That is no feedback: what the model does not know (payload, friction, a
     push) moves the arm unseen, and an arm held upright falls in the end. Close mechanical brakes
-    then. Before the first state there is nothing to hold by, and the torque is zero. A state that
+    then (`needs_brakes`). Before the first state there is nothing to hold by, and the torque is zero. A state that
     stays the same while the arm rests, that drifts slower than `Tolerances` allow, or another
     scene cannot be noticed from here: who watches these calls `stop` or `scene_changed`. Between
     two calls nothing can be done: a torque is held until the next one comes.
@@ -117,10 +116,8 @@ class Supervisor:
             self._brake.begin(*self._state)
             _takes(self._tau, arm.limits.effort, self._tau)
             self._observer = StateObserver(arm, self._fastest, self._tolerances)
-            # What learns, or forgives as much, would explain a late state in time.
-            usual = self._tolerances
-            stricter = replace(usual, velocity=0.25 * usual.velocity, memory=5.0 * usual.memory)
-            self._candidate = StateObserver(arm, self._fastest, stricter, learns=False)
+            self._candidate = StateObserver(arm, self._fastest, self._tolerances)
+            self._candidate.learns = False
             self._measured(0.0, *self._state)
 
     @cached_property
@@ -171,6 +168,11 @@ class Supervisor:
             return False
         is_stopped = self._course.is_paused if self._pauses else self._brake.is_holding
         return is_stopped and bool(np.abs(self._state[1]).max() <= _SLOW)
+
+    @property
+    def needs_brakes(self) -> bool:
+        """Whether the arm rests as far as is known, but no state tells."""
+        return self.is_at_rest and not self.trusts_state
 
     def stop(self, why: str = "The caller asked to stop.", *, at_once: bool = False) -> None:
         """Brake from the next call of `torque` on, and hold still.
@@ -300,6 +302,7 @@ class Supervisor:
 
     def _observe(self, t: float, measured: tuple[Array, Array] | None, dt: float) -> None:
         """Follow the dynamics, and believe the measured state if it agrees with them."""
+        self._observer.learns = self.status.fault == Fault.NONE or self._pauses
         self._observer.advance(min(dt, _LONGEST_PREDICTION), self._period, self._tau)
         self.trusts_state, self._state = False, (self._observer.q, self._observer.v)
         if measured is None:
@@ -310,7 +313,9 @@ class Supervisor:
         if not self._knows_state or dt > _LONGEST_PREDICTION:
             self._believe(*measured)
         elif self._observer.agrees(*measured, 0.0 if repeats else dt):
-            self.trusts_state, self._agreed_for = True, None
+            self.trusts_state = True
+            self._brakes_anew |= self._agreed_for is not None  # which may still be late
+            self._agreed_for = None
         else:
             self._doubt(t, *measured, dt, repeats)
         if self.trusts_state:
@@ -340,7 +345,7 @@ class Supervisor:
                     self._believe(q, v)
                 return
         self._candidate.start(q, v)
-        self._candidate.unexplained[:] = self._observer.unexplained
+        self._candidate.believe(self._observer)
         self._agreed_for = 0.0
 
     def _passes_on(self, t: float, q: Array, v: Array, dt: float) -> bool:
