@@ -1,9 +1,10 @@
 """Tamper with certified runs and count the false certificates.
 
 Every run is made to fail one part of its certificate at least. A false certificate is one that all
-parts hold of. Harmless by design, so not tried: what the certificate does not read (the recorded
-clearance and outcome, the last torque within the limits, names, seed and parameters of planning and
-control), wider limits, fewer obstacles, an obstacle moved out of the way, a goal moved by less than
+parts hold of; a run that only left its tube is certified still, but not "within" one. Harmless by
+design, so not tried: what the certificate does not read (the recorded clearance and outcome, the
+last torque within the limits, names, seed and parameters of planning and control), wider limits,
+fewer obstacles, an obstacle moved out of the way, a goal moved by less than what
 counts as reached, and changes below the tolerances (1e-9 of start and replay).
 
     python benchmarks/false_certificates.py --runs 1000 --json false_certificates.json
@@ -68,16 +69,19 @@ def judge(name: str, runs: Sequence[Run], seed: Seed, tally: Tally) -> None:
         return
     certificate = result.certificate
     failing = {check.name for check in certificate.checks if not check.holds}
-    tally.refused += not certificate.certified
+    is_claimed = certificate.certified and (kind.part != "tube" or bool(certificate.within))
+    tally.refused += not is_claimed
     tally.as_meant += kind.part in failing
-    if certificate.certified:
+    if is_claimed:
         tally.false_certificates.append(f"{result.task.name}, seed {seed}")
 
 
-def false_certificates(runs: Sequence[Run], count: int, seed: int = 0) -> dict[str, Tally]:
-    """Return a tally for each kind of tampering with certified runs."""
-    tallies = {name: Tally() for name in KINDS}
-    for k, name in enumerate(islice(cycle(KINDS), count)):
+def false_certificates(
+    runs: Sequence[Run], count: int, seed: int = 0, parts: Sequence[str] = ()
+) -> dict[str, Tally]:
+    """Return a tally for each kind of tampering with certified runs, of some parts or all."""
+    tallies = {name: Tally() for name, kind in KINDS.items() if not parts or kind.part in parts}
+    for k, name in enumerate(islice(cycle(tallies), count)):
         judge(name, runs, (seed, k), tallies[name])
         if sys.stderr.isatty():
             print(f"\r{k + 1} of {count}", end="", file=sys.stderr)
@@ -107,6 +111,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--runs", type=int, default=1000)
     parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--parts", nargs="+", default=(), help='to make fail, e.g. "tube"')
     parser.add_argument(
         "--scenarios", nargs="+", default=["swing_up", "panda_table", "panda_shelf"]
     )
@@ -116,7 +121,7 @@ def main() -> int:
     for run in runs:
         if not run.certified:
             sys.exit(f"{run.task.name}: not certified to begin with")
-    tallies = false_certificates(runs, options.runs, options.seed)
+    tallies = false_certificates(runs, options.runs, options.seed, options.parts)
     total = report(tallies)
     for name, tally in tallies.items():
         for where in tally.false_certificates:

@@ -9,7 +9,8 @@ at 1 kHz.
 Controllers are told nothing but a delay that is declared. Pushes last 20 ms, at random joints and
 times from which the arm could still be stopped in free space, as `StoppingCheck` proves.
 
-Errors are medians over the runs: the largest off the motion, and that left at the end.
+Errors are medians over the runs: the largest off the motion, as a part of what its tube allows the
+joint too, with the runs that stayed inside of it; and that left at the end.
 """
 
 import argparse
@@ -22,7 +23,6 @@ from typing import Any
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import ArrayLike
 
 import densarm
 from densarm.certificates.task import REACHED_POSITION, REACHED_VELOCITY
@@ -32,7 +32,6 @@ from densarm.planning.plan import plan_path
 from densarm.scene.loading import MotionProblem
 from densarm.simulation.disturbances import Disturbances, Push
 from densarm.study.problems import in_processes, scenario_of
-from densarm.values.arrays import Array
 from densarm.values.outcome import Outcome
 from densarm.world.stopping import StoppingCheck, StoppingTrajectory
 
@@ -43,18 +42,9 @@ PUSH, PUSH_TIME = 2.0, 0.02  # [rad/s], [s]
 LONGEST = 5.0  # [s] after the motion's end
 
 
-class Tracking(densarm.DensityTracking):
-    """The controller of a motion, told a delay [s], that keeps where its reference was."""
-
-    def __init__(self, world: densarm.World, motion: densarm.Motion, delay: float) -> None:
-        self.reference: list[Array] = []
-        super().__init__(world, motion, actuation=ActuationParameters(delay=delay))
-
-    def torque(self, t: float, q: ArrayLike, v: ArrayLike) -> Array:
-        """Act as `DensityTracking.torque`."""
-        tau = super().torque(t, q, v)
-        self.reference.append(self.motion.sample(self.reference_time).position)
-        return tau
+def tracking(world: densarm.World, motion: densarm.Motion, delay: float) -> densarm.Controller:
+    """The controller of a motion, told a delay [s]."""
+    return densarm.DensityTracking(world, motion, actuation=ActuationParameters(delay=delay))
 
 
 def regulation(
@@ -70,12 +60,12 @@ def regulation(
     )
 
 
-def tracking_error(run: densarm.Run, controller: densarm.Controller) -> float | None:
-    """Largest error of a joint against the reference where it was then [rad]; None without one."""
-    if not isinstance(controller, Tracking):
-        return None
-    wanted = np.array(controller.reference[-len(run.q) + 1 :])  # calls before it load kernels
-    return float(np.abs(run.task.arm.angles(run.q[:-1]) - wanted).max())
+def off_reference(run: densarm.Run) -> tuple[float | None, float | None]:
+    """Largest error of a joint against the reference where it was then [rad], and of its tube."""
+    if run.reference is None:
+        return None, None
+    off = np.abs(run.task.arm.angles(run.q) - run.reference)[:-1]
+    return float(off.max()), None if run.tube is None else float((off / run.tube).max())
 
 
 def torque_rate(run: densarm.Run) -> float:
@@ -148,6 +138,10 @@ class Result:
     """Whether it ended at the goal and at rest, touching nothing."""
     error: float | None
     """Largest off the motion [rad]."""
+    share: float | None
+    """The same as a part of the motion's tube."""
+    tube: list[float] | None
+    """The tube [rad]."""
     rest: float
     """Left at the end [rad]."""
     clearance: float
@@ -169,7 +163,7 @@ def run_cases(
     make: Callable[[float], densarm.Controller]
     if form == "tracking":
         motion = densarm.plan_motion(world, scenario.start, scenario.goal, **law)
-        make, moves = partial(Tracking, world, motion), motion.duration
+        make, moves = partial(tracking, world, motion), motion.duration
     else:
         path = plan_path(world, scenario.start, scenario.goal, **law).path
         make = partial(regulation, scenario, path)
@@ -197,7 +191,8 @@ def run_cases(
                     str(run.outcome),
                     run.detail,
                     ended_at_goal(run),
-                    tracking_error(run, controller),
+                    *off_reference(run),
+                    None if run.tube is None else run.tube.tolist(),
                     run.goal_error,
                     float(run.clearance.min()),
                     torque_rate(run),
@@ -238,6 +233,7 @@ def rows(results: Sequence[Result]) -> list[dict[str, str]]:
     for name in dict.fromkeys(result.case for result in results):
         found = [result for result in results if result.case == name]
         errors = [r.error for r in found if r.error is not None]
+        shares = [r.share for r in found if r.share is not None]
         table.append(
             {
                 "case": name,
@@ -246,6 +242,8 @@ def rows(results: Sequence[Result]) -> list[dict[str, str]]:
                 "of": str(len(found)),
                 "error [mrad]": f"{1e3 * np.median(errors):.2f}" if errors else "",
                 "worst": f"{1e3 * np.max(errors):.2f}" if errors else "",
+                "tube used": f"{np.median(shares):.0%}" if shares else "",
+                "inside": f"{sum(share <= 1.0 for share in shares)}" if shares else "",
                 "rest [mrad]": f"{1e3 * np.median([r.rest for r in found]):.2f}",
                 "rate [N·m/ms]": f"{np.max([r.rate for r in found]):.2f}",
                 "time [s]": f"{np.median([r.duration for r in found]):.2f}",

@@ -10,7 +10,7 @@ from .control.controller import Gains as Gains
 from .control.regulation import DensityRegulation as DensityRegulation
 from .control.speed_law import SpeedParameters as SpeedParameters
 from .control.state_observer import Tolerances as Tolerances
-from .control.supervisor import Fault as Fault
+from .control.status import Fault as Fault
 from .control.supervisor import Supervisor as Supervisor
 from .control.tracking import DensityTracking as DensityTracking
 from .density.goal_distance import GoalDistance as GoalDistance

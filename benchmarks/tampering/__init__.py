@@ -1,6 +1,6 @@
 """Ways to make a certified run fail a part of its certificate, each sure to fail it."""
 
-from tampering import claim, file, obstruction, record
+from tampering import claim, file, obstruction, record, tube
 from tampering.kind import Kind, NotPossibleError
 
 __all__ = ["KINDS", "Kind", "NotPossibleError"]
@@ -36,5 +36,15 @@ KINDS = {
     "entry not finite": Kind("file", file.not_finite),
     "row missing": Kind("file", file.missing_row),
     "mesh changed": Kind("file", file.other_mesh),
+    "tube widened": Kind("tube", tube.widened),
+    "one joint's tube widened": Kind("tube", tube.joint_widened),
+    "tube of no width": Kind("tube", tube.not_a_tube),
+    "obstacle in the tube": Kind("tube", tube.obstacle_inside),
+    "obstacle at a stop in it": Kind("tube", tube.obstacle_at_stop),
+    "reference shifted": Kind("tube", tube.reference_shifted),
+    "one reference changed": Kind("tube", tube.reference_bent),
+    "reference late": Kind("tube", tube.reference_late),
+    "run outside its tube": Kind("tube", tube.run_astray),
+    "reference or tube damaged": Kind("file", tube.damaged),
 }
 """All ways, by name."""

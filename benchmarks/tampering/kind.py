@@ -22,7 +22,8 @@ class Kind:
     """A way to tamper with a run."""
 
     part: str
-    """The part of the certificate that must fail; "file" where the file must be refused."""
+    """The part of the certificate that must fail, or not be claimed (tube); "file" where the file
+    must be refused."""
     tamper: Callable[[Run, np.random.Generator], Run]
 
 

@@ -41,8 +41,8 @@ class Check:
     """What was found, in a phrase, with the margin's unit and place."""
     margin: float | None
     """What was to spare where least was: a distance [m] (swept, stopping), a share of the limits
-    (limits), else a part of the tolerance [rad, rad/s]; negative where it fails, None if unknown.
-    """
+    (limits) or of the tube, else a part of the tolerance [rad, rad/s]; negative where it fails,
+    None if unknown."""
     time: float
     """Where that was [s]."""
 
@@ -60,8 +60,22 @@ class Certificate:
         """Whether every part holds that applies."""
         return all(check.holds is not False for check in self.checks)
 
+    @property
+    def within(self) -> str:
+        """What is certified beside the run, as a phrase: what keeps as near to its reference."""
+        tube = next((check for check in self.checks if check.name == "tube"), None)
+        return tube.detail.split(";")[0] if self.certified and tube and tube.holds else ""
 
-def certify(task: Task, time: Array, q: Array, v: Array, tau: Array) -> Certificate:
+
+def certify(
+    task: Task,
+    time: Array,
+    q: Array,
+    v: Array,
+    tau: Array,
+    reference: Array | None = None,
+    tube: Array | None = None,
+) -> Certificate:
     """Return what is proved about a run, from its record alone, whose arrays are as in `Run`.
 
     The parts: swept check of the whole motion against the scene and the arm itself, start and
@@ -71,18 +85,22 @@ def certify(task: Task, time: Array, q: Array, v: Array, tau: Array) -> Certific
     is at rest, not that nothing runs into it afterwards. Torque limits do not apply to commanded
     velocities, nor to an arm without masses, whose dynamics nothing can replay; nor is a plant
     replayed that is disturbed, or MuJoCo's.
+
+    With a reference and a tube, as in `Run` too, one more part: whatever keeps as near to the
+    reference, or to a stopping trajectory from it, is clear, and this run does.
     """
     world = World(task.arm, task.scene)
-    return Certificate(
-        (
-            _swept(task, world, q, v),
-            _start(task, q, v, time),
-            _goal(task, q, v),
-            _limits(task, q, v, tau),
-            _replay(task, q, v, tau),
-            _stopping(task, world, q, v),
-        )
-    )
+    checks = [
+        _swept(task, world, q, v),
+        _start(task, q, v, time),
+        _goal(task, q, v),
+        _limits(task, q, v, tau),
+        _replay(task, q, v, tau),
+        _stopping(task, world, q, v),
+    ]
+    if reference is not None and tube is not None:
+        checks.append(_tube(task, world, q, reference, tube))
+    return Certificate(tuple(checks))
 
 
 def swept_result(world: World, q: Array, v: Array, dt: float) -> SweptResult:
@@ -259,6 +277,35 @@ def _stopping(task: Task, world: World, q: Array, v: Array) -> Check:
     elif set(task.disturbances) - _OF_SENSORS:
         detail += "; by the torque of the arm's model, not of the disturbed plant"
     return Check("stopping", True, detail, _finite(rest.min()), at)
+
+
+def _tube(task: Task, world: World, q: Array, reference: Array, tube: Array) -> Check:
+    """Prove clear what is within ε of a reference, and of stopping trajectories from it."""
+    arm, dt = task.arm, task.simulation.dt
+    if world.fastest_obstacle > 0.0:
+        return Check("tube", None, "does not apply: obstacles move", None, 0.0)
+    if not (tube > 0.0).all():
+        return Check("tube", False, "a bound on the error is not positive", None, 0.0)
+    wanted = arm.configurations(reference)
+    steps = np.diff(reference, axis=0)
+    bend = np.abs(np.diff(steps, axis=0, prepend=0.0, append=0.0))
+    departure, kept = np.maximum(bend[:-1], bend[1:]) / 8.0, world.lipschitz @ tube
+    result = SweptCheck(world, kept=kept).check(wanted, departure)
+    within = f"within ±{tube.min():.2g} to ±{tube.max():.2g} rad or m of the reference"
+    if result.verdict != SweptVerdict.CLEAR:
+        pairs, at = ", ".join(f"{a}-{b}" for a, b in result.pairs[:3]), result.index * dt
+        return Check("tube", False, f"not clear {within} at t = {at:.3f} s: {pairs}", None, at)
+    check = StoppingCheck(world, StoppingTrajectory(arm), kept=kept)
+    stopped = check.check(wanted[:-1], steps / dt)
+    if stopped.failing.size:
+        at = float(stopped.failing[0]) * dt
+        return Check("tube", False, f"stopping not clear {within} at t = {at:.3f} s", None, at)
+    share, k, joint = _peak(np.abs(arm.difference(wanted, q)) / tube)
+    used = f"{arm.joint_names[joint]} used {share:.0%} of it at t = {k * dt:.3f} s"
+    if share > 1.0:
+        detail = f"does not apply: clear {within}, which the run left; {used}"
+        return Check("tube", None, detail, 1.0 - share, k * dt)
+    return Check("tube", True, f"clear {within}; {used}", 1.0 - share, k * dt)
 
 
 def _nearest(distance: float, at: float) -> str:

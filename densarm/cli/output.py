@@ -140,7 +140,8 @@ def print_run(run: Run, compiled: float) -> None:
 
 def print_certificate(certificate: Certificate) -> None:
     """Print each check of a certificate and whether it holds."""
-    click.echo(f"{'certified':<{_COLUMN}}{_verdict(certificate.certified)}")
+    within = f", {certificate.within}" if certificate.within else ""
+    click.echo(f"{'certified':<{_COLUMN}}{_verdict(certificate.certified)}{within}")
     for check in certificate.checks:
         click.echo(f"  {check.name:<{_COLUMN - 2}}{_verdict(check.holds)}  {check.detail}")
 

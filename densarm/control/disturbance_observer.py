@@ -135,12 +135,17 @@ class DisturbanceObserver:
         """Use another L [1/s]."""
         self._numbers[1] = bandwidth
 
-    def take_over(self, other: "DisturbanceObserver") -> None:
-        """Go on from another's estimates and torques, of the same arm."""
-        self._time = other._time
+    def take_over(self, other: "DisturbanceObserver", t: float) -> None:
+        """Go on from another's estimates and torques, of the same arm, as if known at t [s]."""
+        self._time = t
         self.rows[:_LARGEST] = other.rows[:_LARGEST]
         n = min(len(self.sent), len(other.sent))
         self.sent[-n:] = other.sent[-n:]
+
+    def move_to(self, angles: Array, v: Array) -> None:
+        """Take the arm to be at joint positions (nv,) with velocities (nv,), all else as it is."""
+        self.rows[ANGLE] = self.rows[AHEAD_ANGLE] = angles
+        self.rows[VELOCITY] = self.rows[AHEAD_VELOCITY] = v
 
 
 @compiled

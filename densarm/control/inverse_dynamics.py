@@ -121,9 +121,15 @@ class InverseDynamics:
         """Return whether an update at a time [s] knows of none before."""
         return self._observer.begins(t)
 
-    def take_over(self, other: "InverseDynamics") -> None:
-        """Go on from another's disturbance and torques, of the same arm."""
-        self._observer.take_over(other._observer)
+    def take_over(self, other: "InverseDynamics", t: float) -> None:
+        """Go on from another's disturbance and torques, of the same arm, as if known at t [s]."""
+        self._observer.take_over(other._observer, t)
+
+    def move_to(self, q: Array, v: Array, disturbance: Array | None = None) -> None:
+        """Take the arm to be at q (nq,) with v (nv,), under another disturbance (nv,) if given."""
+        self._observer.move_to(self._arm.angles(q), v)
+        if disturbance is not None:
+            self.rows[DISTURBANCE] = disturbance
 
     def set_bandwidth(self, bandwidth: float) -> None:
         """Find disturbances with another bandwidth [1/s], as that of `ActuationParameters`."""

@@ -101,6 +101,11 @@ class FieldRegulation:
         wanted = self._dynamics.torque(-self._gain * v, self._gain * self._limited(q, metric))
         return self._filter.torque(t, self._dynamics, q, v, wanted, self._field.distances)
 
+    @property
+    def dynamics(self) -> InverseDynamics:
+        """What is known of disturbance and torques."""
+        return self._dynamics
+
     def velocity(self, t: float, q: ArrayLike, v: ArrayLike) -> Array:
         """Return the planning system k(q) itself, as `VelocityController.velocity`."""
         return self._limited(checked_state(self._arm, q, v)[0], None)

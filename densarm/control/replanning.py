@@ -7,7 +7,9 @@ from numpy.typing import ArrayLike
 
 from densarm.arms.arm import Arm
 from densarm.control.controller import Controller, Gains, checked_state
-from densarm.control.supervisor import Fault, Supervisor
+from densarm.control.status import Fault
+from densarm.control.supervisor import Supervisor
+from densarm.planning.motion import Motion
 from densarm.values.arrays import Array
 
 _LOST = 0.2  # from the reference in any joint [rad or m]
@@ -62,6 +64,16 @@ class Replanning:
     def tracking_error(self) -> float | None:
         """As `Supervisor.tracking_error`, of the controller along the plan."""
         return self._supervisor.tracking_error
+
+    @property
+    def motion(self) -> Motion | None:
+        """As `Supervisor.motion`."""
+        return self._supervisor.motion
+
+    @property
+    def reference(self) -> Array | None:
+        """As `Supervisor.reference`."""
+        return self._supervisor.reference
 
     @property
     def is_moving(self) -> bool | None:

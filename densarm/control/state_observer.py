@@ -20,8 +20,8 @@ from densarm.values.kernels import compiled
 class Tolerances:
     """How far state and clock may be off before a supervisor stops the arm.
 
-    A model whose accelerations are wrong by δa lets the observed velocity lag by δa · `memory`
-    and the position by δa · `memory`²: the defaults allow 4 rad/s².
+    A model whose accelerations come to be wrong by δa at once lets the observed velocity lag by
+    δa · `memory` / e: the defaults allow 100 rad/s², Coulomb friction of 1 N·m in a wrist.
 
     Raises:
         InvalidValueError: a value that is not positive.
@@ -29,12 +29,13 @@ class Tolerances:
 
     position: float = 0.0025
     """Largest difference of a joint from where the dynamics put it [rad or m]."""
-    velocity: float = 0.1
+    velocity: float = 0.4
     """Largest difference of its velocity [rad/s or m/s]."""
-    memory: float = 0.025
+    memory: float = 0.01
     """Time in which the observed state forgets such a difference [s]."""
     tracking: float = 0.02
-    """Largest distance of a joint from the controller's reference, if it has one [rad or m]."""
+    """Largest distance of a joint from the controller's reference, if it has one [rad or m]; the
+    motion's tube where that is wider."""
     gap: float = 0.005
     """Longest time between two calls [s]; at least one and a half periods."""
     delay: float = 0.05
@@ -50,18 +51,26 @@ class StateObserver:
 
     .. math::
 
-        \dot{\hat v} = M^{-1} (\tau - H) + (v - \hat v) / T, \qquad
-        \dot{\hat q} = \hat v + (q \ominus \hat q) / T
+        \hat v^- = \hat v + \Delta t\, \big( M^{-1} ((1 - \kappa) \tau - H) + \hat a \big), \quad
+        r = v - \hat v^-, \quad \hat v = \hat v^- + (1 - \lambda^2)\, r, \quad
+        \hat a \mathrel{+}= \frac{(1 - \lambda)^2}{\Delta t} r, \quad \lambda = e^{-\Delta t / T}
 
-    A measurement agrees if each joint's differences are within the tolerances. One that does not
-    is left out: the observed state then follows the dynamics alone.
+    and q̂ as v̂. κ and â are what the model does not explain, so that a wrong model does not look
+    like a jump: κ, as if all masses were wrong alike, takes from â over 30 ms what it can, for it
+    holds while the arm stops too. A measurement agrees if each joint's differences are within the
+    tolerances. One that does not is left out: the observed state then follows the dynamics alone.
 
     Args:
         arm: its dynamics.
         fastest: bound on the observed velocity (nv,) [rad/s or m/s].
         tolerances: T is their `memory`.
 
-    Source: D. G. Luenberger, An introduction to observers, IEEE TAC 1971.
+    Attributes:
+        learns: whether κ and â are observed. Else they stay, and the tolerances are stricter: a
+            late state is not to be explained by them.
+
+    Source: D. G. Luenberger, An introduction to observers, IEEE TAC 1971; J. Han, as in
+        `DisturbanceObserver`.
     """
 
     def __init__(self, arm: Arm, fastest: Array, tolerances: Tolerances) -> None:
@@ -70,7 +79,10 @@ class StateObserver:
         self._tolerances = tolerances
         self._fastest = fastest
         self._joint_index = arm.joint_index
-        self._angles, self._off = np.zeros((2, arm.nv))
+        self.learns = True
+        self._angles, self._off, self._none = np.zeros((3, arm.nv))
+        # Rows: â, τ and M⁻¹ τ; then κ alone.
+        self._unexplained = np.zeros((4, arm.nv))
         self.q: Array = arm.configurations(self._angles)
         """Observed configuration (nq,), overwritten by the next call."""
         self.v: Array = np.zeros(arm.nv)
@@ -83,11 +95,19 @@ class StateObserver:
         """Begin at a state, q (nq,) and v (nv,)."""
         self.q[:], self.v[:], self._angles[:] = q, v, self._arm.angles(q)
 
+    def believe(self, other: "StateObserver") -> None:
+        """Take over what another found that the model does not explain."""
+        self._unexplained[:] = other._unexplained
+
     def advance(self, time: float, step: float, tau: Array) -> None:
         """Follow the dynamics for a time [s] by steps [s] of at most so long, tau (nv,) held."""
+        model, data, known = self._arm.model, self._data, self._unexplained
         n = max(math.ceil(time / step - 1e-6), 1)
         for _ in range(n):
-            a = pin.aba(self._arm.model, self._data, self.q, self.v, tau)
+            free = np.array(pin.aba(model, data, self.q, self.v, self._none))
+            a = pin.aba(model, data, self.q, self.v, tau)
+            known[_TORQUE], known[_PUSH] = tau, a - free
+            a = a + known[_UNEXPLAINED] - known[_SCALE, 0] * known[_PUSH]
             _advance(time / n, a, self._fastest, self._joint_index, self._angles, self.v, self.q)
 
     def agrees(self, q: Array, v: Array, time: float) -> bool:
@@ -95,10 +115,26 @@ class StateObserver:
 
         The time is that since the last measurement [s], zero for one that tells nothing new.
         """
-        position, velocity = self._tolerances.position, self._tolerances.velocity
-        share, index = min(time / self._tolerances.memory, 1.0), self._joint_index
-        observed = self._angles, self.v, self.q, self._off
-        return _draw(q, v, share, position, velocity, index, *observed)
+        memory, velocity = self._tolerances.memory, self._tolerances.velocity
+        if not self.learns:
+            memory, velocity = _LATER_MEMORY * memory, _LATER_VELOCITY * velocity
+        return _draw(
+            q,
+            v,
+            np.array([time, memory, self._tolerances.position, velocity, float(self.learns)]),
+            self._joint_index,
+            self._angles,
+            self.v,
+            self.q,
+            self._off,
+            self._unexplained,
+        )
+
+
+_UNEXPLAINED, _TORQUE, _PUSH, _SCALE = 0, 1, 2, 3
+_LATER_MEMORY, _LATER_VELOCITY = 5.0, 0.25  # parts of the tolerances without learning
+_SCALE_TIME = 0.03  # [s]
+_LARGEST_SCALE = 0.5  # of κ
 
 
 @compiled
@@ -124,21 +160,36 @@ def _advance(
 def _draw(
     q: Array,
     v: Array,
-    share: float,
-    position: float,
-    velocity: float,
+    numbers: Array,
     joint_index: NDArray[np.int64],
     angles: Array,
     v_observed: Array,
     q_observed: Array,
     off: Array,
+    known: Array,
 ) -> bool:
+    time, memory, position, velocity, learns = numbers
     joint_error(q_observed, q, joint_index, off)
     for i in range(v.size):
         if abs(off[i]) > position or abs(v[i] - v_observed[i]) > velocity:
             return False
+    learn = 1.0 - math.exp(-time / memory)
+    keep = learn * (2.0 - learn)
+    unexplained, tau, push = known[_UNEXPLAINED], known[_TORQUE], known[_PUSH]
+    explained, power = 0.0, 0.0
     for i in range(v.size):
-        angles[i] += share * off[i]
-        v_observed[i] += share * (v[i] - v_observed[i])
+        r = v[i] - v_observed[i]
+        angles[i] += keep * off[i]
+        v_observed[i] += keep * r
+        if learns > 0.0 and time > 0.0:
+            unexplained[i] += learn * learn / time * r
+        explained -= tau[i] * unexplained[i]
+        power += tau[i] * push[i]
+    if learns > 0.0 and power > 0.0:  # least squares in the metric M, as M⁻¹ τ is the push
+        scale = known[_SCALE, 0] + min(time / _SCALE_TIME, 1.0) * explained / power
+        scale = min(max(scale, -_LARGEST_SCALE), _LARGEST_SCALE)
+        for i in range(v.size):
+            unexplained[i] += (scale - known[_SCALE, 0]) * push[i]
+        known[_SCALE, 0] = scale
     write_configuration(angles, joint_index, q_observed)
     return True

@@ -16,6 +16,7 @@ from densarm.world.stopping import StoppingTrajectory
 
 _REST = 1e-3  # [rad/s or m/s], below which the arm is held where it is
 _GENTLE_BANDWIDTH = 8.0  # [1/s] of the observer, stable with a delay of 50 ms in the state
+_FADING = 0.015  # [s] in which braking fades, as slowly as torque may change where the arm holds
 _ACCELERATION_SHARE = 0.97  # asked for: a torque is held while the state changes
 
 
@@ -32,6 +33,9 @@ class StopAndHold:
     explain, by a `DisturbanceObserver`, so that the arm does not sag under a load that is not told.
     Where gravity asks for more torque than there is, the arm cannot be held. The period is the time
     between two calls [s].
+
+    Attributes:
+        dynamics: with what is known of disturbance and torques.
     """
 
     def __init__(
@@ -45,36 +49,50 @@ class StopAndHold:
         self._gains = gains
         self._period = self._shortest = period
         limit = _ACCELERATION_SHARE * arm.limits.acceleration
-        self._dynamics = InverseDynamics(arm, limit, None, period, actuation)
-        self._dynamics.load()
+        self.dynamics = InverseDynamics(arm, limit, None, period, actuation)
+        self.dynamics.load()
         self._bandwidth = actuation.bandwidth
         self._time = 0.0
         self._stopping = StoppingTrajectory(arm, _ACCELERATION_SHARE)
         self._time_left = math.nan
         self._rest: Array | None = None
+        self._known: Array | None = None  # of the disturbance, before it stopped
 
     @property
     def is_holding(self) -> bool:
         """Whether the arm has come to rest since the last `begin`."""
         return self._rest is not None
 
-    def begin(self, q: Array, v: Array, is_gentle: bool = False) -> None:
-        """Begin to stop from q (nq,) and v (nv,); gently: as -K_v q̇ in the end.
+    def begin(self, q: Array, v: Array, known: InverseDynamics | None = None) -> None:
+        """Begin to stop from q (nq,) and v (nv,).
 
-        That is stable with a delayed state too.
+        What others know of disturbance and torques is gone on from; without it they are unknown.
+        """
+        if known is None:  # what was observed when it stopped before is of another motion
+            self.dynamics.update(math.nan, q, v)
+        else:
+            self.dynamics.take_over(known, self._time)
+        self._known = None if known is None else known.disturbance
+        self.begin_again(q, v)
+        self._shortest = max(self._period, _FADING)
+        self.dynamics.set_bandwidth(self._bandwidth)
+
+    def begin_again(self, q: Array, v: Array) -> None:
+        """Begin anew from another state, as the arm turned out to be in while it stopped.
+
+        From now on it ends gently, as -K_v q̇, which is stable with a delayed state too, as all is
+        that is learned of the disturbance: states that were wrong have shaped it since.
         """
         self._time_left = self._stopping.duration(q, v)
-        self._shortest = 1.0 / self._gains.velocity if is_gentle else self._period
+        self._shortest = max(self._period, 1.0 / self._gains.velocity)
         self._rest = None
-        trusted = self._bandwidth
-        self._dynamics.set_bandwidth(min(trusted, _GENTLE_BANDWIDTH) if is_gentle else trusted)
-        # What was observed when it stopped before is of another motion.
-        self._dynamics.update(math.nan, q, v)
+        self.dynamics.set_bandwidth(min(self._bandwidth, _GENTLE_BANDWIDTH))
+        self.dynamics.move_to(q, v, self._known)
 
     def torque(self, q: Array, v: Array, dt: float) -> Array:
         """Return the torque (nv,) [N·m or N] at q (nq,) and v (nv,), dt [s] after the last call."""
         self._time, self._time_left = self._time + dt, self._time_left - dt
-        self._dynamics.update(self._time, q, v)
+        self.dynamics.update(self._time, q, v)
         is_braking = self._rest is None
         if is_braking and np.abs(v).max() <= _REST:
             self._rest = q.copy()
@@ -82,10 +100,10 @@ class StopAndHold:
             error = self._arm.difference(self._rest, q)
             brake, attract = -self._gains.velocity * v, -self._gains.position * error
             # The torque of the brake would push a resting arm on: it ends at once.
-            tau = self._dynamics.torque(brake, attract)
-            return self._dynamics.send(tau, is_emergency=is_braking)
-        tau = self._dynamics.brake_torque(v, self._time_left, self._shortest)
-        return self._dynamics.send(tau, is_emergency=True)
+            tau = self.dynamics.torque(brake, attract)
+            return self.dynamics.send(tau, is_emergency=is_braking)
+        tau = self.dynamics.brake_torque(v, self._time_left, self._shortest)
+        return self.dynamics.send(tau, is_emergency=True)
 
 
 class BackupFilter:

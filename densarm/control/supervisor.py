@@ -1,8 +1,6 @@
 """Supervisor: lets a controller act while all is well, and else stops the arm and holds it."""
 
 import math
-from dataclasses import dataclass
-from enum import StrEnum
 from functools import cached_property
 
 import numpy as np
@@ -10,12 +8,14 @@ from numpy.typing import ArrayLike
 
 from densarm.arms.arm import Arm
 from densarm.control.controller import Controller, Gains, checked_state
+from densarm.control.course import Course
+from densarm.control.inverse_dynamics import InverseDynamics
 from densarm.control.state_observer import StateObserver, Tolerances
+from densarm.control.status import Fault, Status
 from densarm.control.stopping import StopAndHold
 from densarm.planning.motion import Motion
 from densarm.values.arrays import Array
 from densarm.values.checks import positive
-from densarm.values.documented import documented
 from densarm.values.kernels import compiled
 
 HOLDING_GAINS = Gains(position=50.0, velocity=15.0)
@@ -29,42 +29,6 @@ _ROUNDING = 1e-9  # relative, of torques at their limits
 _SLOW = 0.01  # [rad/s or m/s], which counts as rest
 
 
-class Fault(StrEnum):
-    """What a supervisor found, or was told."""
-
-    NONE = "none"
-    """Nothing is wrong; the controller acts."""
-    NOT_A_STATE = "not_a_state"
-    """The state had a wrong shape, was not finite, not on the unit circle or beyond reason."""
-    JUMPED = "jumped"
-    """The state is not where the dynamics could have brought it."""
-    FROZEN = "frozen"
-    """The configuration stayed the same while the arm must have moved."""
-    LATE = "late"
-    """Too much time passed between two calls."""
-    CLOCK = "clock"
-    """The time was not a finite number, or ran backwards."""
-    OFF_COURSE = "off_course"
-    """The arm is too far from where the controller wants it to be."""
-    NO_TORQUE = "no_torque"
-    """The controller failed, or gave a torque that is not finite or beyond the limits."""
-    SCENE_CHANGED = "scene_changed"
-    """The caller told that the scene is not that of the plan."""
-    STOPPED = "stopped"
-    """The caller asked for it."""
-
-
-@documented
-@dataclass(frozen=True)
-class Status:
-    """The first thing that went wrong since the controller last acted."""
-
-    fault: Fault = Fault.NONE
-    """What it was."""
-    sentence: str = "The controller acts."
-    """The same in words, with the time and the values."""
-
-
 class Supervisor:
     """Passes on another controller's torque while all is well, and else stops the arm.
 
@@ -73,6 +37,10 @@ class Supervisor:
     reference if it has one (`tracking_error`), and the controller gives a finite torque within the
     limits. Else the arm stops along a straight line and holds still, until `resume` is called: a
     controller that follows a reference in time would otherwise chase what went on without it.
+
+    A controller that can `pause`, as `DensityTracking` does, stops the arm itself when it is told
+    to, and before a joint leaves the tube in which its motion is proved clear: on the motion, which
+    the straight line takes over from where that goes wrong too.
     `torque` never raises, and whatever it is given its result is finite and within the torque
     limits. Without a fault it is the controller's, bit for bit.
 
@@ -82,20 +50,22 @@ class Supervisor:
     What it rests on. A measured state that does not agree is left out, and the arm is braked where
     the dynamics say that it is; one that then agrees with itself for the time `delay` is believed.
     Without any believable state the arm is held by the torque that the model's gravity asks for at
-    the observed rest. That is no feedback: what the model does not know (payload, friction, a
-    push) moves the arm unseen, and an arm held upright falls in the end. Close mechanical brakes
-    then. Before the first state there is nothing to hold by, and the torque is zero. A state that
-    stays the same while the arm rests, that drifts slower than `Tolerances` allow, or another
-    scene cannot be noticed from here: who watches these calls `stop` or `scene_changed`. Between
-    two calls nothing can be done: a torque is held until the next one comes.
+    the observed rest. That is no feedback: what the model does not know (payload, friction, a push)
+    moves the arm unseen, and an arm held upright falls in the end. Close mechanical brakes then
+    (`needs_brakes`). Before the first state there is nothing to hold by, and the torque is zero. A
+    state that stays the same while the arm rests, that drifts slower than `Tolerances` allow, or
+    another scene cannot be noticed from here: who watches these calls `stop` or `scene_changed`.
+    Between two calls nothing can be done: a torque is held until the next one comes.
 
     Args:
         arm: the arm, as the plant is.
         controller: acts while all is well.
         period: time between two calls [s].
         tolerances: what counts as normal; None to trust state, clock and controller.
-        gains: hold the arm at rest; higher ones sag less under a payload that the model does not
-            know, and bear less delay.
+        gains: hold the arm at rest; higher ones bear less delay.
+        patience: time at rest in the tube after which the controller acts again by itself [s],
+            its reference going on from where it is, but where the caller stopped the arm; None
+            for never.
 
     Attributes:
         controller: what acts while all is well.
@@ -114,6 +84,7 @@ class Supervisor:
         period: float = 0.001,
         tolerances: Tolerances | None = Tolerances(),
         gains: Gains = HOLDING_GAINS,
+        patience: float | None = None,
     ) -> None:
         arm.require_masses("a supervisor's torque")
         self.controller = controller
@@ -128,17 +99,25 @@ class Supervisor:
         velocity = arm.limits.velocity
         self._fastest = np.where(np.isfinite(velocity), _FASTEST * velocity, _UNLIMITED_FASTEST)
         self._gains = gains
+        self._patience = math.inf if patience is None else positive("patience", patience)
+        self._rested = 0.0
+        self._pauses = False  # whether the controller itself stops the arm
+        self._handed_over: InverseDynamics | None = None  # what it is to go on from
+        self._called = False  # whether it was, at this call
+        self._has_braked = False  # during this stop
+        self._course = self._course_of(controller)
         self._agreed_for: float | None = None  # the candidate, if there is one
         self._tau = np.zeros(arm.nv)
         self._time: float | None = None  # of the last call
         self._last_q = b""  # as measured
-        self._knows_state = self._brakes_anew = self._has_rested = self._needs_plan = False
+        self._knows_state = self._brakes_anew = self._needs_plan = False
         self._state = arm.configuration(np.zeros(arm.nv)), np.zeros(arm.nv)
         if not self._is_trusting:  # kernels are loaded, or compiled, here rather than in a loop
             self._brake.begin(*self._state)
             _takes(self._tau, arm.limits.effort, self._tau)
             self._observer = StateObserver(arm, self._fastest, self._tolerances)
             self._candidate = StateObserver(arm, self._fastest, self._tolerances)
+            self._candidate.learns = False
             self._measured(0.0, *self._state)
 
     @cached_property
@@ -154,6 +133,12 @@ class Supervisor:
     def motion(self) -> Motion | None:
         """The controller's motion, if it has one."""
         return getattr(self.controller, "motion", None)
+
+    @property
+    def reference(self) -> Array | None:
+        """Where the controller wants the joints (nv,) [rad or m]; None if it stops, or has none."""
+        acts = self.status.fault == Fault.NONE
+        return getattr(self.controller, "reference", None) if acts else None
 
     @property
     def is_moving(self) -> bool | None:
@@ -179,16 +164,24 @@ class Supervisor:
     @property
     def is_at_rest(self) -> bool:
         """Whether the arm was stopped, and rests as far as is known."""
-        is_stopped = self.status.fault != Fault.NONE and self._brake.is_holding
+        if self.status.fault == Fault.NONE:
+            return False
+        is_stopped = self._course.is_paused if self._pauses else self._brake.is_holding
         return is_stopped and bool(np.abs(self._state[1]).max() <= _SLOW)
 
-    def stop(self, why: str = "The caller asked to stop.") -> None:
+    @property
+    def needs_brakes(self) -> bool:
+        """Whether the arm rests as far as is known, but no state tells."""
+        return self.is_at_rest and not self.trusts_state
+
+    def stop(self, why: str = "The caller asked to stop.", *, at_once: bool = False) -> None:
         """Brake from the next call of `torque` on, and hold still.
 
         Args:
             why: for the status.
+            at_once: along a straight line, even if the controller can pause on its motion.
         """
-        self._stop(Fault.STOPPED, why)
+        self._stop(Fault.STOPPED, why, pauses=not at_once)
 
     def scene_changed(self, how: str = "The scene has changed.") -> None:
         """Brake from the next call of `torque` on, hold still, and resume with a new plan only.
@@ -217,31 +210,61 @@ class Supervisor:
             return False
         if self._needs_plan and controller is None:
             return False
-        self._needs_plan = self._has_rested = False
+        where = None if acts or self._pauses else self._state[0]
+        if not acts and controller is None and not self._course.resume(where):
+            return False
+        known = self._dynamics if where is None else self._brake.dynamics
         if controller is not None:
             self.controller, self._began = controller, None
-        self.status, self._time = Status(), None
+            self._course = self._course_of(controller)
+        self._handed_over = None if known is self._dynamics else known
+        self._needs_plan = self._pauses = False
+        self.status, self._time, self._rested, self._has_braked = Status(), None, 0.0, False
         return True
+
+    def _course_of(self, controller: Controller) -> Course:
+        most = None if self._is_trusting else self._tolerances.tracking
+        return Course(self._arm, controller, most)
 
     def torque(self, t: float, q: ArrayLike, v: ArrayLike) -> Array:
         """Act as `Controller.torque`, but never raise unless it trusts: see `status`."""
+        self._called = False
         if self._is_trusting and self.status.fault == Fault.NONE:
-            return self.controller.torque(self._own_time(t), q, v)
+            return self._controllers_torque(t, q, v, self._period)
         dt = self._elapsed(t)
         measured = checked_state(self._arm, q, v) if self._is_trusting else self._measured(t, q, v)
         if self._is_trusting and measured is not None:
             self._state, self._knows_state, self.trusts_state = measured, True, True
         else:
             self._observe(t, measured, dt)
-        acts = self.status.fault == Fault.NONE and measured is not None
-        if not (acts and self._passes_on(t, *self._state)):
+        self._resume_by_itself(dt)
+        acts = (self.status.fault == Fault.NONE or self._pauses) and measured is not None
+        if not (acts and self._passes_on(t, *self._state, dt)):
             self._brake_or_hold(dt)
         return self._tau.copy()
 
-    def _stop(self, fault: Fault, sentence: str) -> None:
-        if self.status.fault == Fault.NONE:
+    def _stop(self, fault: Fault, sentence: str, *, pauses: bool = False) -> None:
+        acts = self.status.fault == Fault.NONE
+        if acts:
             self.status = Status(fault, sentence)
+        if not (acts or self._pauses):
+            return
+        pausing = self._course.pausing if pauses else None
+        self._pauses = pausing is not None
+        if pausing is None:
             self._brakes_anew = True
+        else:
+            pausing.pause()
+
+    def _resume_by_itself(self, dt: float) -> None:
+        """Let the controller act again where the arm has rested for as long as the patience."""
+        was_told = self.status.fault in {Fault.NONE, Fault.STOPPED, Fault.SCENE_CHANGED}
+        rests = not was_told and self.is_at_rest and self.trusts_state
+        self._rested = self._rested + dt if rests else 0.0
+        if self._rested >= self._patience:
+            time = self._time
+            self.resume()
+            self._time, self._rested = time, 0.0
 
     def _elapsed(self, t: float) -> float:
         """Return the time since the last call [s], a period where it is not known."""
@@ -279,6 +302,7 @@ class Supervisor:
 
     def _observe(self, t: float, measured: tuple[Array, Array] | None, dt: float) -> None:
         """Follow the dynamics, and believe the measured state if it agrees with them."""
+        self._observer.learns = self.status.fault == Fault.NONE or self._pauses
         self._observer.advance(min(dt, _LONGEST_PREDICTION), self._period, self._tau)
         self.trusts_state, self._state = False, (self._observer.q, self._observer.v)
         if measured is None:
@@ -289,7 +313,9 @@ class Supervisor:
         if not self._knows_state or dt > _LONGEST_PREDICTION:
             self._believe(*measured)
         elif self._observer.agrees(*measured, 0.0 if repeats else dt):
-            self.trusts_state, self._agreed_for = True, None
+            self.trusts_state = True
+            self._brakes_anew |= self._agreed_for is not None  # which may still be late
+            self._agreed_for = None
         else:
             self._doubt(t, *measured, dt, repeats)
         if self.trusts_state:
@@ -319,27 +345,41 @@ class Supervisor:
                     self._believe(q, v)
                 return
         self._candidate.start(q, v)
+        self._candidate.believe(self._observer)
         self._agreed_for = 0.0
 
-    def _passes_on(self, t: float, q: Array, v: Array) -> bool:
+    def _passes_on(self, t: float, q: Array, v: Array, dt: float) -> bool:
         """Take the controller's torque over if it may be applied."""
         limit = self._arm.limits.effort
         try:
-            own = self.controller.torque(self._own_time(t), q, v)
-            tau = np.asarray(own, dtype=np.float64)
-            off = float(self.tracking_error or 0.0)
+            tau = np.asarray(self._controllers_torque(t, q, v, dt), dtype=np.float64)
+            off, is_astray = self._course.fault(q)
         except Exception as error:  # noqa: BLE001  # whatever fails, the arm must be stopped
             self._stop(Fault.NO_TORQUE, f"At t = {t} s the controller failed: {_one_line(error)}.")
             return False
-        if not off <= self._tolerances.tracking:
-            why = f"off the controller's reference by {off:.3g} rad or m"
-            self._stop(Fault.OFF_COURSE, f"At t = {t} s the arm is {why}.")
-        elif tau.shape == limit.shape and _takes(tau, limit, self._tau):
+        if off and (self.status.fault == Fault.NONE or is_astray):
+            sentence = f"At t = {t} s the arm is off the controller's reference by {off}."
+            self._stop(Fault.OFF_COURSE, sentence, pauses=not is_astray)
+        if off and not self._pauses:
+            return False
+        if tau.shape == limit.shape and _takes(tau, limit, self._tau):
             return True
-        else:
-            why = f"{_one_line(tau)}, and the limits are {_one_line(limit)}"
-            self._stop(Fault.NO_TORQUE, f"At t = {t} s the controller gave {why}.")
+        why = f"{_one_line(tau)}, and the limits are {_one_line(limit)}"
+        self._stop(Fault.NO_TORQUE, f"At t = {t} s the controller gave {why}.")
         return False
+
+    @property
+    def _dynamics(self) -> InverseDynamics | None:
+        """The controller's, if it tells."""
+        return getattr(self.controller, "dynamics", None)
+
+    def _controllers_torque(self, t: float, q: ArrayLike, v: ArrayLike, dt: float) -> Array:
+        own, self._called = self._own_time(t), True
+        if self._handed_over is not None:
+            if (dynamics := self._dynamics) is not None:
+                dynamics.take_over(self._handed_over, own - dt)
+            self._handed_over = None
+        return self.controller.torque(own, q, v)
 
     def _own_time(self, t: float) -> float:
         if self._began is None:
@@ -351,10 +391,13 @@ class Supervisor:
             self._tau[:] = 0.0
             return
         if self._brakes_anew:
-            self._brake.begin(*self._state, is_gentle=self._has_rested)
-            self._brakes_anew, dt = False, 0.0
+            if self._has_braked:
+                self._brake.begin_again(*self._state)
+            else:
+                self._brake.begin(*self._state, known=self._dynamics)
+            self._brakes_anew, self._has_braked = False, True
+            dt = 0.0 if self._called else dt
         tau = self._brake.torque(*self._state, dt)
-        self._has_rested |= self._brake.is_holding
         if not _takes(tau, self._arm.limits.effort, self._tau):
             self._tau[:] = 0.0
 

@@ -134,20 +134,22 @@ class DensityTracking:
         self._kinematics = Kinematics(arm)
         distance = goal_distance or TorusDistance(arm)
         unsafe = [*_sensed_off(world, motion, sensing, self._kinematics), *unsafe_sets]
+        self._goes_on_from: float | None = None
         self._density = NavigationDensity(arm, self.goal, unsafe, distance, density)
         self._gains = gains
+        self._numbers = np.zeros(_N_NUMBERS)
         if arm.links_without_mass:
             self.velocity(0.0, self.goal, np.zeros(arm.nv))
             return
         unlimited = np.full(arm.nv, math.inf)
         self._dynamics = InverseDynamics(arm, unlimited, self._kinematics, motion.period, actuation)
-        self._numbers = np.zeros(_N_NUMBERS)
         kappa = distance.kappa if isinstance(distance, TorusDistance) else math.nan
         constants = motion.period, actuation.delay, kappa, gains.position, gains.velocity
-        self._numbers[_PERIOD:] = constants
+        self._numbers[_PERIOD:] = *constants, 1.0
         self._time, self._clock = math.nan, self._numbers[_CLOCK].copy()
-        self._sample = np.zeros((5, arm.nv))
+        self._sample = np.zeros((6, arm.nv))
         self._sample[_WEIGHTS] = getattr(distance, "weights", 1.0)
+        self._sample[_MOST] = _PAUSE_SHARE * arm.limits.acceleration
         for t in (0.0, motion.period, math.nan):  # kernels are loaded before a control loop
             self.torque(t, self.goal, np.zeros(arm.nv))
         self.tracking_error = 0.0
@@ -163,7 +165,10 @@ class DensityTracking:
         self._kinematics.update(q)
         numbers, dynamics = self._numbers, self._dynamics
         begins, elapsed = dynamics.begins(t), dynamics.update(t, q, v)
-        if begins:
+        if self._goes_on_from is not None:
+            numbers[_CLOCK] = t - self._goes_on_from, 0.0, 0.0, 0.0
+            self._goes_on_from = None
+        elif begins or math.isnan(numbers[_TIME]):
             numbers[_CLOCK] = 0.0, 1.0, 0.0, 0.0
         elif t == self._time:  # asked again, which moves no clock
             numbers[_CLOCK] = self._clock
@@ -188,10 +193,50 @@ class DensityTracking:
         )
         return np.array(dynamics.rows[TORQUE])
 
+    def pause(self) -> None:
+        """Let the reference's clock come to rest, so that the arm rests on the motion."""
+        self._numbers[_WANTED_RATE] = 0.0
+
+    def resume(self, q: ArrayLike | None = None, within: float | Array = math.inf) -> bool:
+        """Let the reference go on after a pause, or after the arm was stopped by another.
+
+        Args:
+            q: configuration (nq,) where the arm rests, from which nearest place on the motion the
+                reference is to go on, at any time of the next call; None for where it paused.
+            within: how far off that place the joints may be (nv,) [rad or m].
+
+        Returns:
+            Whether it goes on: it does not from farther off.
+        """
+        if q is not None:
+            wanted = self._arm.configurations(self.motion.position)
+            off = np.abs(self._arm.difference(wanted, np.asarray(q, np.float64))) / within
+            nearest = int(off.max(axis=1).argmin())
+            if not off[nearest].max() <= 1.0:
+                return False
+            self._goes_on_from = nearest * self.motion.period
+        self._numbers[_WANTED_RATE] = 1.0
+        return True
+
+    @property
+    def is_paused(self) -> bool:
+        """Whether the reference was made to pause, and rests."""
+        return self._numbers[_WANTED_RATE] == 0.0 and bool(self._numbers[_RATE] < _PAUSED)
+
+    @property
+    def dynamics(self) -> InverseDynamics:
+        """What is known of disturbance and torques."""
+        return self._dynamics
+
     @property
     def reference_time(self) -> float:
         """The reference's own time σ at the last call [s]: it waits where the arm is held up."""
         return float(self._numbers[_TIME])
+
+    @property
+    def reference(self) -> Array:
+        """The joint positions (nv,) that were wanted at the last call [rad or m]."""
+        return self.motion.sample(self.reference_time).position
 
     @property
     def is_moving(self) -> bool:
@@ -202,7 +247,7 @@ class DensityTracking:
         """Act as `VelocityController.velocity`, v being the velocity commanded last."""
         q, v = checked_state(self._arm, q, v)
         self._kinematics.update(q)
-        motion, limits = self.motion, self._arm.limits
+        motion, limits, self._numbers[_TIME] = self.motion, self._arm.limits, t
         now, then = motion.sample(t), motion.sample(t + motion.period)
         follow = (then.position - now.position) / motion.period
         wanted = follow + self._gains.rate * self._attraction(q, now.position)
@@ -287,15 +332,17 @@ def _worth_sensing(wanted: Array, least: float, most: float) -> Array:
     return np.where(wanted < least, -np.inf, np.minimum(wanted, most))
 
 
-_POSITION, _VELOCITY, _ACCELERATION, _ERROR, _WEIGHTS = 0, 1, 2, 3, 4  # rows of a sample
+_POSITION, _VELOCITY, _ACCELERATION, _ERROR, _WEIGHTS, _MOST = 0, 1, 2, 3, 4, 5  # rows of a sample
 
 # Numbers of the kernel: the reference's time σ, how far it is behind, and its derivatives.
 _TIME, _LAG, _RATE, _CHANGE, _EMERGENCY, _ELAPSED = 0, 1, 2, 3, 4, 5
 _CLOCK = slice(_LAG, _EMERGENCY + 1)
 _LOG_PSI, _PERIOD, _DELAY, _KAPPA, _POSITION_GAIN, _VELOCITY_GAIN = 6, 7, 8, 9, 10, 11
-_N_NUMBERS = 12
+_WANTED_RATE, _N_NUMBERS = 12, 13
 
 _CLOCK_RATE = 20.0  # ω [1/s]
+_PAUSE_SHARE = 0.95  # of the acceleration limits, that pausing takes with the motion
+_PAUSED = 0.01  # σ̇ below which the reference counts as at rest
 _WAITING_ERROR, _FREE_ERROR = 0.03, 0.005  # ε, and what the reference does not wait for [rad or m]
 _FREE_LOAD = 0.05  # of the torque left, which unknown torque may take without slowing the reference
 _LEAST_SHARE = 0.1  # of torque that counts as left
@@ -327,6 +374,7 @@ def _tracking_torque(
     write_sample(u, u + 0.5 * rate * elapsed / period, period, knots, sample)
     error, attract, largest, left, n = sample[_ERROR], rows[ATTRACT], 0.0, 1.0, nonlinear.size
     fastest = 0.0
+    slowest = -math.inf  # that σ̈ may be, for accelerations to keep their limits
     for i in range(n):
         off = rows[AHEAD_ANGLE, i] - sample[_POSITION, i]
         if joint_index[1, i]:
@@ -348,7 +396,11 @@ def _tracking_torque(
         velocity, most = sample[_VELOCITY, i], damping * _RETURN_SHARE * rows[VELOCITY_LIMIT, i]
         pull = min(max(stiffness * attract[i], -most), most)
         attract[i] = pull - damping * (rows[AHEAD_VELOCITY, i] - rate * velocity)
-        rows[BRAKE, i] = rate * rate * sample[_ACCELERATION, i] + numbers[_CHANGE] * velocity
+        a = rate * rate * sample[_ACCELERATION, i]
+        rows[BRAKE, i] = a + numbers[_CHANGE] * velocity
+        if velocity != 0.0:
+            least = -(sample[_MOST, i] + math.copysign(a, a * velocity)) / abs(velocity)
+            slowest = max(slowest, min(least, 0.0))
     if fastest > _PUSHED or largest < _RETURNED:
         numbers[_EMERGENCY] = fastest > _PUSHED
     if numbers[_EMERGENCY] > 0.0:
@@ -357,8 +409,10 @@ def _tracking_torque(
     robust_torque(mass, nonlinear, damping, elapsed, late, rows)
     send(gravity, rows, sent)
     waiting = max(largest - _FREE_ERROR, 0.0) / _WAITING_ERROR
-    wanted = math.sqrt(max(left, _LEAST_SHARE)) / (1.0 + waiting * waiting)
+    wanted = numbers[_WANTED_RATE] * math.sqrt(max(left, _LEAST_SHARE)) / (1.0 + waiting * waiting)
     step = min(_CLOCK_RATE * elapsed, 1.0)
     change = numbers[_CHANGE] + step * (_CLOCK_RATE * (wanted - rate) - 2.0 * numbers[_CHANGE])
+    if wanted == 0.0:
+        change = max(change, slowest)
     numbers[_CHANGE], numbers[_RATE] = change, max(rate + elapsed * change, 0.0)
     return largest

@@ -14,6 +14,8 @@ from densarm.values.checks import positive
 from densarm.values.documented import documented
 from densarm.values.kernels import compiled, compiled_part
 from densarm.values.outcome import Outcome
+from densarm.world.tracking_tube import tracking_tube
+from densarm.world.world import World
 
 
 @documented
@@ -89,6 +91,19 @@ class Motion:
     """Why it ends short of the goal; empty where it does not."""
     remark: str = ""
     """Which critical points of ρ its curve left, and how; empty where it met none."""
+    world: World | None = None
+    """The arm among obstacles that it was planned for; None where nothing is known of them."""
+
+    @cached_property
+    def tube(self) -> Array | None:
+        """Bounds ε on the tracking error under which it stays clear (nv,) [rad or m], or None.
+
+        They are proved when first asked for, among obstacles as they are then: see
+        `tracking_tube`.
+        """
+        if self.world is None:
+            return None
+        return tracking_tube(self.world, self.position, self.velocity)
 
     @property
     def duration(self) -> float:

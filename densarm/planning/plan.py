@@ -135,6 +135,7 @@ def plan_motion(
         plan_time=planned.plan_time,
         detail=stuck,
         remark=remark,
+        world=world,
     )
     if stuck:
         raise PlanningError(Outcome.STUCK, stuck, motion)

@@ -26,6 +26,7 @@ _UNIT_TOLERANCE = 1e-6
 _FAULTS = (ValueError, OverflowError, KeyError, TypeError, AttributeError, EOFError)
 _DAMAGE = (BadZipFile, zlib.error, NotImplementedError)  # what reading a damaged archive raises
 _ARRAYS = ("time", "q", "v", "tau", "clearance")
+_OPTIONAL = ("reference", "tube")
 
 
 @documented
@@ -65,6 +66,12 @@ class Run:
     """Times at which the arm had lost its plan, and there was a new one from where it was [s]."""
     remark: str = ""
     """Which critical points of ρ it left, and how, in a phrase; empty where it met none."""
+    reference: Array | None = None
+    """Joint positions that the controller wanted (N, nv) [rad or m]; continuous joints count turns;
+    None where it had no reference all the time."""
+    tube: Array | None = None
+    """Bounds ε on the error against it under which the plan is clear (nv,) [rad or m]; None without
+    any."""
 
     @classmethod
     def at_rest(cls, task: Task, world: World, outcome: Outcome, detail: str) -> "Run":
@@ -92,7 +99,8 @@ class Run:
     @cached_property
     def certificate(self) -> Certificate:
         """What is proved about the run, computed anew from the record when first asked for."""
-        return certify(self.task, self.time, self.q, self.v, self.tau)
+        arrays = self.time, self.q, self.v, self.tau, self.reference, self.tube
+        return certify(self.task, *arrays)
 
     @cached_property
     def base_overlaps(self) -> tuple[str, ...]:
@@ -128,6 +136,7 @@ class Run:
             "plan_time_s": self.plan_time,
             "preparation_time_s": self.preparation_time,
             "certified": self.certified,
+            "tube_rad": None if self.tube is None else self.tube.tolist(),
             "plant": self.task.plant,
             "disturbances": dict(self.task.disturbances),
         }
@@ -156,6 +165,11 @@ class Run:
             np.savez_compressed(
                 file,
                 **{name: getattr(self, name) for name in _ARRAYS},
+                **{
+                    name: getattr(self, name)
+                    for name in _OPTIONAL
+                    if getattr(self, name) is not None
+                },
                 scenario=np.array(json.dumps(self.task.to_json())),
                 result=np.array(json.dumps(result)),
             )
@@ -172,6 +186,7 @@ class Run:
             _check_archive(path)
             with Path(path).open("rb") as file, np.load(file, allow_pickle=False) as data:
                 arrays = {name: data[name] for name in _ARRAYS}
+                arrays |= {name: data[name] for name in _OPTIONAL if name in data}
                 task = json.loads(str(data["scenario"]))
                 result = json.loads(str(data["result"]))
             deviation = result["tracking_error_rad"]
@@ -203,8 +218,11 @@ class Run:
         n, arm = len(self.time), self.task.arm
         parse_table("disturbances", Disturbances, self.task.disturbances)
         shapes = {"time": (n,), "q": (n, arm.nq), "v": (n, arm.nv), "tau": (n, arm.nv)}
-        for name, shape in {**shapes, "clearance": (n,)}.items():
+        shapes |= {"clearance": (n,), "reference": (n, arm.nv), "tube": (arm.nv,)}
+        for name, shape in shapes.items():
             array = getattr(self, name)
+            if array is None and name in _OPTIONAL:
+                continue
             if array.dtype != np.float64:
                 raise DensarmError(f"{name} holds {array.dtype}, not float64")
             if array.shape != shape or n == 0:

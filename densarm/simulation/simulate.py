@@ -166,6 +166,7 @@ class _Loop:
     def run(self, on_progress: OnProgress) -> Run:
         task, p = self.task, self.task.simulation
         q, v, inputs = task.start, np.zeros(task.arm.nv), []
+        wanted: list[Array | None] = []
         held, rest, rested_since = 0, q, 0
         motion = getattr(self.controller, "motion", None)
         moves_until = 0.0 if motion is None else motion.duration
@@ -175,6 +176,7 @@ class _Loop:
         for k in range(round(p.time_limit / p.dt)):
             if k % p.control_divisor == 0:
                 u = self._input(k * p.dt, *self.signals.measured(q, v))
+                wanted.append(getattr(self.controller, "reference", None))
                 error = getattr(self.controller, "tracking_error", None)
                 if error is not None:
                     tracking_error = max(float(error), tracking_error or 0.0)
@@ -198,6 +200,7 @@ class _Loop:
             if k % _PROGRESS_INTERVAL == 0:
                 on_progress(f"running, {k * p.dt:.1f} s simulated")
         tau = np.array([*inputs, inputs[-1]])
+        motion, reference = getattr(self.controller, "motion", None), self._reference(wanted)
         return Run(
             task=task,
             time=p.dt * np.arange(len(self.q), dtype=np.float64),
@@ -210,6 +213,8 @@ class _Loop:
             tracking_error=tracking_error,
             replanned_at=tuple(getattr(self.controller, "replanned_at", ())),
             remark=str(getattr(self.controller, "remark", "")),
+            reference=reference,
+            tube=None if reference is None or motion is None else motion.tube,
         )
 
     def _input(self, t: float, q: Array, v: Array) -> Array:
@@ -217,6 +222,15 @@ class _Loop:
         if not (isinstance(u, np.ndarray) and u.shape == v.shape and np.isfinite(u).all()):
             u = finite_vector(f"{self.task.input} of the controller at t = {t:.3f} s", u, len(v))
         return np.array(u, np.float64)  # a controller may write the next one into the same array
+
+    def _reference(self, wanted: list[Array | None]) -> Array | None:
+        """Return the reference (nv,) of each control period at each sample (N, nv)."""
+        known = [row for row in wanted if row is not None]
+        if len(known) < len(wanted):
+            return None
+        at, every = np.arange(len(self.q)), self.task.simulation.control_divisor
+        columns = [np.interp(at, every * np.arange(len(known)), row) for row in np.transpose(known)]
+        return np.transpose(columns)
 
     def _record(self, q: Array, v: Array) -> str:
         """Keep a state; return what touches there, or in the step before, as a phrase."""

@@ -176,7 +176,7 @@ class StoppingCheck:
         turns = np.cumsum(arm.difference(q[:-1], q[1:]), axis=0)
         angles = arm.angles(q[0]) + np.vstack([np.zeros(arm.nv), turns])
         if time is None:
-            clear = self._clear(angles, travel)
+            clear = self.are_clear(angles, travel)
         else:
             clear = self._clear_meanwhile(angles, v, np.where(inside, duration, np.inf), time)
         return StoppingResult(duration, end, inside, clear)
@@ -196,7 +196,13 @@ class StoppingCheck:
             clear[n] = self._swept.check(q, departure, times).verdict == SweptVerdict.CLEAR
         return clear
 
-    def _clear(self, angles: Array, travel: Array) -> NDArray[np.bool_]:
+    def are_clear(self, angles: Array, travel: Array) -> NDArray[np.bool_]:
+        """Return which segments of joint space are proved clear (N,); neighbours should be alike.
+
+        Args:
+            angles: where they begin (N, nv) [rad or m]; continuous joints count their turns.
+            travel: from there to where they end (N, nv) [rad or m].
+        """
         n, end = len(angles), angles + travel
         clear = np.zeros(n, dtype=np.bool_)
         if not np.isfinite(end).all():

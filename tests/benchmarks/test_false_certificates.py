@@ -18,6 +18,11 @@ KINDS = [
     "torque limit lowered",
     "obstacle enlarged",
     "row missing",
+    "tube widened",
+    "obstacle in the tube",
+    "one reference changed",
+    "run outside its tube",
+    "reference or tube damaged",
 ]
 
 

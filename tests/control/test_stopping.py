@@ -99,7 +99,8 @@ def test_a_gentle_stop_ends_in_damping() -> None:
     q, v = ARM.postures["hanging"], np.array([1e-2, -1e-2])
     hard, gentle = StopAndHold(ARM, Gains(), DT), StopAndHold(ARM, Gains(), DT)
     hard.begin(q, v)
-    gentle.begin(q, v, is_gentle=True)
+    gentle.begin(q, v)
+    gentle.begin_again(q, v)
     taus = [stop.torque(q, v, 0.0) for stop in (hard, gentle)]
     accelerations = [np.array(pin.aba(ARM.model, ARM.data, q, v, tau)) for tau in taus]
     np.testing.assert_allclose(accelerations[1], -Gains().velocity * v, rtol=1e-6)
