@@ -39,7 +39,8 @@ def moving_sample(run: Run, rng: np.random.Generator) -> int:
 
 def regridded(run: Run, rows: NDArray[np.int64]) -> Run:
     """Return the run of some of its samples as if no other had been."""
-    arrays = {name: getattr(run, name)[rows] for name in ROWS[1:]}
+    named = ROWS[1:] if run.reference is None else (*ROWS[1:], "reference")
+    arrays = {name: getattr(run, name)[rows] for name in named}
     return replace(
         run, time=run.task.simulation.dt * np.arange(len(rows), dtype=np.float64), **arrays
     )

@@ -11,7 +11,8 @@ from densarm.planning.motion import Motion
 from densarm.values.arrays import Array
 
 _USED_SHARE = 0.9  # of a motion's tube, which the arm may use
-_RESUMING_SHARE = 0.8  # of how far off it may be, from where a controller may go on
+_RESUMING_SHARE = 0.8  # of it, or of the distance, from where a controller may go on
+_LOST = 0.5  # [rad or m] off, from where no controller is left to return to its motion
 
 
 class PausingController(Controller, Protocol):
@@ -42,8 +43,9 @@ class Course:
     """Tells how far an arm is off a controller's reference.
 
     Inside the tube in which its motion is proved clear nothing is wrong. Near the end of it the
-    controller is to pause on the motion, if it can; beyond the tube, and a distance [rad or m]
-    where that is more, the arm is astray. Without a tube that distance alone counts.
+    controller is to pause, and to return to its motion: an arm that was pushed off it is turned
+    away from what is near so, and a straight line is not. Far from it the arm is astray, and
+    without a tube at a distance [rad or m].
 
     Args:
         arm: the arm.
@@ -70,7 +72,8 @@ class Course:
         """Let a controller that can pause go on, as it does; others may act as they are."""
         if self.pausing is None:
             return True
-        return self.pausing.resume(q, _RESUMING_SHARE * self._farthest())
+        tube = np.full(self._arm.nv, self._most) if self._tube is None else self._tube
+        return self.pausing.resume(q, _RESUMING_SHARE * tube)
 
     def fault(self, q: Array) -> tuple[str, bool]:
         """Return in which way the arm at q (nq,) is off its course, and whether it is astray.
@@ -87,9 +90,5 @@ class Course:
         if error[joint] <= _USED_SHARE * self._tube[joint]:
             return "", False
         told = f"{error[joint]:.3g} rad or m in {self._arm.joint_names[joint]}"
-        is_astray = not bool((error <= self._farthest()).all())
+        is_astray = not bool(error.max() <= max(_LOST, self._tube.max()))
         return f"{told}, where {self._tube[joint]:.3g} are proved clear", is_astray
-
-    def _farthest(self) -> Array:
-        tube = np.zeros(self._arm.nv) if self._tube is None else self._tube
-        return np.maximum(tube, self._most)

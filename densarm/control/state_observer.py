@@ -21,7 +21,7 @@ class Tolerances:
     """How far state and clock may be off before a supervisor stops the arm.
 
     A model whose accelerations come to be wrong by δa at once lets the observed velocity lag by
-    δa · `memory` / e: the defaults allow 100 rad/s², Coulomb friction of 1 N·m in a wrist.
+    δa · `memory` / e: the defaults allow 130 rad/s², Coulomb friction of 1 N·m in a wrist.
 
     Raises:
         InvalidValueError: a value that is not positive.
@@ -29,13 +29,13 @@ class Tolerances:
 
     position: float = 0.0025
     """Largest difference of a joint from where the dynamics put it [rad or m]."""
-    velocity: float = 0.4
+    velocity: float = 0.5
     """Largest difference of its velocity [rad/s or m/s]."""
     memory: float = 0.01
     """Time in which the observed state forgets such a difference [s]."""
     tracking: float = 0.02
-    """Largest distance of a joint from the controller's reference, if it has one [rad or m]; the
-    motion's tube where that is wider."""
+    """Largest distance of a joint from the controller's reference, if it has one [rad or m], and
+    its motion no tube."""
     gap: float = 0.005
     """Longest time between two calls [s]; at least one and a half periods."""
     delay: float = 0.05
@@ -66,8 +66,7 @@ class StateObserver:
         tolerances: T is their `memory`.
 
     Attributes:
-        learns: whether κ and â are observed. Else they stay, and the tolerances are stricter: a
-            late state is not to be explained by them.
+        learns: whether κ and â are observed; see `doubt`.
 
     Source: D. G. Luenberger, An introduction to observers, IEEE TAC 1971; J. Han, as in
         `DisturbanceObserver`.
@@ -81,8 +80,8 @@ class StateObserver:
         self._joint_index = arm.joint_index
         self.learns = True
         self._angles, self._off, self._none = np.zeros((3, arm.nv))
-        # Rows: â, τ and M⁻¹ τ; then κ alone.
-        self._unexplained = np.zeros((4, arm.nv))
+        # Rows: â, τ, M⁻¹ τ, κ alone, and the mean of â over a while.
+        self._unexplained = np.zeros((5, arm.nv))
         self.q: Array = arm.configurations(self._angles)
         """Observed configuration (nq,), overwritten by the next call."""
         self.v: Array = np.zeros(arm.nv)
@@ -95,9 +94,14 @@ class StateObserver:
         """Begin at a state, q (nq,) and v (nv,)."""
         self.q[:], self.v[:], self._angles[:] = q, v, self._arm.angles(q)
 
-    def believe(self, other: "StateObserver") -> None:
-        """Take over what another found that the model does not explain."""
-        self._unexplained[:] = other._unexplained
+    def doubt(self, known: "StateObserver") -> None:
+        """Learn no more: take what another knew for long of κ and â, with stricter tolerances.
+
+        What a wrong state has shaped is not to explain it.
+        """
+        self.learns = False
+        self._unexplained[:] = known._unexplained
+        self._unexplained[_UNEXPLAINED] = self._unexplained[_MEAN]
 
     def advance(self, time: float, step: float, tau: Array) -> None:
         """Follow the dynamics for a time [s] by steps [s] of at most so long, tau (nv,) held."""
@@ -131,10 +135,11 @@ class StateObserver:
         )
 
 
-_UNEXPLAINED, _TORQUE, _PUSH, _SCALE = 0, 1, 2, 3
+_UNEXPLAINED, _TORQUE, _PUSH, _SCALE, _MEAN = 0, 1, 2, 3, 4
 _LATER_MEMORY, _LATER_VELOCITY = 5.0, 0.25  # parts of the tolerances without learning
 _SCALE_TIME = 0.03  # [s]
 _LARGEST_SCALE = 0.5  # of κ
+_MEAN_TIME = 0.1  # [s]
 
 
 @compiled
@@ -190,6 +195,7 @@ def _draw(
         scale = min(max(scale, -_LARGEST_SCALE), _LARGEST_SCALE)
         for i in range(v.size):
             unexplained[i] += (scale - known[_SCALE, 0]) * push[i]
+            known[_MEAN, i] += min(time / _MEAN_TIME, 1.0) * (unexplained[i] - known[_MEAN, i])
         known[_SCALE, 0] = scale
     write_configuration(angles, joint_index, q_observed)
     return True

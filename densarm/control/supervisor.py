@@ -50,12 +50,13 @@ class Supervisor:
     What it rests on. A measured state that does not agree is left out, and the arm is braked where
     the dynamics say that it is; one that then agrees with itself for the time `delay` is believed.
     Without any believable state the arm is held by the torque that the model's gravity asks for at
-    the observed rest. That is no feedback: what the model does not know (payload, friction, a push)
-    moves the arm unseen, and an arm held upright falls in the end. Close mechanical brakes then
-    (`needs_brakes`). Before the first state there is nothing to hold by, and the torque is zero. A
-    state that stays the same while the arm rests, that drifts slower than `Tolerances` allow, or
-    another scene cannot be noticed from here: who watches these calls `stop` or `scene_changed`.
-    Between two calls nothing can be done: a torque is held until the next one comes.
+    the observed rest, and by what was learned of that before. That is no feedback: what is not
+    known moves the arm unseen, and an arm held upright falls in the end. Close mechanical brakes
+    then (`needs_brakes`). Before the first state there is nothing to hold by, and the torque is
+    zero. A state that stays the same while the arm rests, that drifts slower than `Tolerances`
+    allow, or another scene cannot be noticed from here: who watches these calls `stop` or
+    `scene_changed`. Between two calls nothing can be done: a torque is held until the next one
+    comes.
 
     Args:
         arm: the arm, as the plant is.
@@ -117,7 +118,6 @@ class Supervisor:
             _takes(self._tau, arm.limits.effort, self._tau)
             self._observer = StateObserver(arm, self._fastest, self._tolerances)
             self._candidate = StateObserver(arm, self._fastest, self._tolerances)
-            self._candidate.learns = False
             self._measured(0.0, *self._state)
 
     @cached_property
@@ -219,6 +219,8 @@ class Supervisor:
             self._course = self._course_of(controller)
         self._handed_over = None if known is self._dynamics else known
         self._needs_plan = self._pauses = False
+        if not self._is_trusting:
+            self._observer.learns = True
         self.status, self._time, self._rested, self._has_braked = Status(), None, 0.0, False
         return True
 
@@ -302,7 +304,7 @@ class Supervisor:
 
     def _observe(self, t: float, measured: tuple[Array, Array] | None, dt: float) -> None:
         """Follow the dynamics, and believe the measured state if it agrees with them."""
-        self._observer.learns = self.status.fault == Fault.NONE or self._pauses
+        self._observer.learns |= self.trusts_state and self.is_at_rest
         self._observer.advance(min(dt, _LONGEST_PREDICTION), self._period, self._tau)
         self.trusts_state, self._state = False, (self._observer.q, self._observer.v)
         if measured is None:
@@ -344,8 +346,10 @@ class Supervisor:
                 if self._agreed_for >= self._tolerances.delay:
                     self._believe(q, v)
                 return
+        if self._observer.learns:
+            self._observer.doubt(self._observer)
         self._candidate.start(q, v)
-        self._candidate.believe(self._observer)
+        self._candidate.doubt(self._observer)
         self._agreed_for = 0.0
 
     def _passes_on(self, t: float, q: Array, v: Array, dt: float) -> bool:

@@ -19,7 +19,7 @@ KINDS = [
     "obstacle enlarged",
     "row missing",
     "tube widened",
-    "obstacle in the tube",
+    "reference late",
     "one reference changed",
     "run outside its tube",
     "reference or tube damaged",

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from densarm.certificates.certificate import REPLAY_TOLERANCE, certify, replay_errors
+from densarm.certificates.certificate import REPLAY_TOLERANCE, Check, certify, replay_errors
 from densarm.certificates.task import Input, SimulationParameters, Task
 from densarm.control.regulation import DensityRegulation
 from densarm.control.speed_law import SpeedParameters
@@ -23,11 +23,21 @@ PARTS = ["swept", "start", "goal", "limits", "replay", "stopping"]
 
 
 def failing(run: Run) -> set[str]:
-    certificate = run.certificate
+    """Return the parts that fail, of what is claimed of the run itself, not of its tube."""
+    certificate = replace(run, tube=None).certificate
     assert [check.name for check in certificate.checks] == PARTS
     names = {check.name for check in certificate.checks if not check.holds}
     assert certificate.certified == (not names)
     return names
+
+
+def tube_check(run: Run) -> Check:
+    """Return the check of the tube; nothing is certified within it unless that holds."""
+    certificate = run.certificate
+    assert [check.name for check in certificate.checks] == [*PARTS, "tube"]
+    check = certificate.checks[-1]
+    assert bool(certificate.within) == (certificate.certified and check.holds is True)
+    return check
 
 
 def tampered(run: Run, name: str, row: int, column: int, change: float) -> Run:
@@ -56,13 +66,39 @@ def failing_if(run: Run, **claims: Any) -> set[str]:
     return {check.name for check in certificate.checks if check.holds is False}
 
 
+def test_a_run_is_certified_within_its_tube(swing_up_run: Run) -> None:
+    check = tube_check(swing_up_run)
+    assert check.holds
+    assert swing_up_run.certificate.within.startswith("clear within ±0.00")
+    assert check.margin is not None
+    assert check.margin > 0.5  # of the tube
+
+
+def test_a_tube_that_is_too_wide_is_refused(swing_up_run: Run) -> None:
+    assert swing_up_run.tube is not None
+    for tube in (20.0 * swing_up_run.tube, np.array([1e-3, 0.0]), np.array([np.nan, 1e-3])):
+        wide = replace(swing_up_run, tube=tube)
+        assert tube_check(wide).holds is False
+        assert not wide.certified
+
+
+def test_what_left_its_tube_is_certified_without_it(swing_up_run: Run) -> None:
+    assert swing_up_run.reference is not None
+    assert swing_up_run.tube is not None
+    reference = swing_up_run.reference.copy()
+    reference[-50:] += 1.5 * swing_up_run.tube * np.array([1.0, 0.0])
+    check = tube_check(replace(swing_up_run, reference=reference))
+    assert check.holds is None
+    assert "which the run left" in check.detail
+
+
 def test_replay_does_not_apply_to_another_plant_and_all_else_does(swing_up_run: Run) -> None:
     assert failing_if(swing_up_run, plant="mujoco") == set()
     assert failing_if(swing_up_run, disturbances={"payload": 1.0}) == set()
     moved_goal = moved(swing_up_run, goal=(3.13, 0.02))
     assert failing_if(replace(swing_up_run, task=moved_goal), plant="mujoco") == {"goal"}
     heavy = replace(swing_up_run, task=replace(swing_up_run.task, disturbances={"payload": 1.0}))
-    assert "not of the disturbed plant" in heavy.certificate.checks[-1].detail
+    assert "not of the disturbed plant" in heavy.certificate.checks[5].detail
 
 
 def test_noise_of_sensors_leaves_the_plant_to_be_replayed(swing_up_run: Run) -> None:

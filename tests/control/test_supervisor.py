@@ -1,6 +1,8 @@
 """Supervisor: invisible without faults; finite torque within limits whatever comes."""
 
+import math
 from collections.abc import Callable
+from dataclasses import replace
 from functools import cache
 from typing import Any
 
@@ -18,12 +20,16 @@ from densarm.control.status import Fault
 from densarm.control.supervisor import Supervisor
 from densarm.control.tracking import DensityTracking
 from densarm.errors import InvalidValueError
+from densarm.planning.motion import Motion
 from densarm.planning.plan import plan_motion
 from densarm.scenarios.run import run
 from densarm.scenarios.scenario import Scenario, load_scenario
+from densarm.simulation.disturbances import Disturbances, Push
 from densarm.simulation.plants import PinocchioPlant
 from densarm.simulation.run import Run
+from densarm.simulation.simulate import simulate
 from densarm.values.arrays import Array
+from densarm.values.outcome import Outcome
 
 DT = 0.001  # [s]
 USUAL = Tolerances()
@@ -459,3 +465,120 @@ def test_stop_at_any_time(recorded: Run) -> None:
         off = path - np.outer(path @ direction, direction)
         assert np.abs(off).max() < 1e-3
         assert np.abs(arm.difference(q[-100], q[-1])).max() < 1e-5
+
+
+# In the tube of a motion.
+
+
+class Panda:
+    """The Panda on its way out of the shelf, under a supervisor, in a disturbed plant."""
+
+    def __init__(self, scenario: Scenario, motion: Motion, **keywords: Any) -> None:
+        world = scenario.world
+        self.tracking = DensityTracking(world, motion)
+        self.supervisor = Supervisor(scenario.arm, self.tracking, DT, **keywords)
+        self.motion, self.scenario = motion, scenario
+        self.faults: list[Fault] = []
+        self.goal, self.is_moving = scenario.goal, True
+        self.stop_at, self.at_once, self.seen = math.inf, False, lambda _, q: q
+        self.off: list[Array] = []
+
+    def torque(self, t: float, q: Array, v: Array) -> Array:
+        if t >= self.stop_at:
+            self.supervisor.stop(at_once=self.at_once)
+            self.stop_at = math.inf
+        tau = self.supervisor.torque(t, self.seen(t, q), v)
+        if not self.faults or self.faults[-1] != self.supervisor.status.fault:
+            self.faults.append(self.supervisor.status.fault)
+        self.off.append(self.scenario.arm.angles(q) - self.tracking.reference)
+        return tau
+
+    def run(self, time: float, **disturbances: Any) -> Run:
+        parameters = replace(self.scenario.simulation, time_limit=time, stall_time=time)
+        told, start = Disturbances(**disturbances), self.scenario.start
+        world = self.scenario.world
+        return simulate(world, self, start, disturbances=told, parameters=parameters)
+
+    @property
+    def share(self) -> float:
+        """Of the tube, that was used."""
+        assert self.motion.tube is not None
+        return float((np.abs(self.off) / self.motion.tube).max())
+
+
+@pytest.fixture(scope="module")
+def shelf() -> tuple[Scenario, Motion]:
+    scenario = load_scenario("panda_shelf")
+    return scenario, plan_motion(scenario.world, scenario.start, scenario.goal)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "told",
+    [
+        {"mass_scale": 1.1},
+        {"payload": 1.0},
+        {"coulomb": 0.5},
+        {"pushes": (Push(0.5, "panda_joint1", 0.2, 0.02),)},
+    ],
+)
+def test_nothing_inside_the_tube_is_a_fault(
+    shelf: tuple[Scenario, Motion], told: dict[str, Any]
+) -> None:
+    panda = Panda(*shelf)
+    assert panda.run(3.0, **told).outcome == Outcome.REACHED
+    assert panda.faults == [Fault.NONE]
+    assert panda.share < 0.9
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("payload", [0.0, 1.0])
+def test_stops_on_the_motion_and_goes_on(shelf: tuple[Scenario, Motion], payload: float) -> None:
+    panda = Panda(*shelf)
+    panda.stop_at = 0.5
+    told = {"payload": payload} if payload else {}
+    run = panda.run(1.4, **told)
+    arm = run.task.arm
+    assert panda.faults == [Fault.NONE, Fault.STOPPED]
+    assert panda.supervisor.is_at_rest
+    assert panda.tracking.is_paused
+    assert 0.5 < panda.tracking.reference_time < 0.7
+    assert panda.share < 0.9
+    gravity = [pin.computeGeneralizedGravity(arm.model, arm.data, q).copy() for q in run.q]
+    rate = np.abs(np.diff(run.tau - gravity, axis=0))[:-1]
+    assert rate.max() <= 1.0 + 1e-6
+    assert (np.abs(np.diff(run.v, axis=0)) / DT <= arm.limits.acceleration).all()
+    assert panda.supervisor.resume()
+    q, v = run.q[-1], run.v[-1]
+    panda.supervisor.torque(run.time[-1], q, v)
+    assert panda.tracking.reference_time < 0.7
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("payload", [1.0, 3.0])
+def test_an_unknown_payload_does_not_sag_when_another_takes_over(
+    shelf: tuple[Scenario, Motion], payload: float
+) -> None:
+    panda = Panda(*shelf)
+    panda.stop_at, panda.at_once = 0.02, True
+    run = panda.run(1.0, payload=payload)
+    sag = run.task.arm.angles(run.q[25:]) - run.task.arm.angles(run.q[25])
+    assert np.abs(sag).max() < 0.02
+    still = run.task.arm.angles(run.q[500:]) - run.task.arm.angles(run.q[-1])
+    assert np.abs(still).max() < 1e-3
+
+
+@pytest.mark.slow
+def test_resumes_by_itself_on_its_motion(shelf: tuple[Scenario, Motion]) -> None:
+    """A late call at 0.2 s, before the arm is fast, is braked; then it goes on where it is."""
+    panda = Panda(*shelf, patience=0.1)
+    lost = np.full(7, np.nan)
+    panda.seen = lambda t, q: lost if 0.2 <= t < 0.203 else q
+    run = panda.run(6.0)
+    assert run.outcome == Outcome.REACHED
+    assert panda.faults == [Fault.NONE, Fault.NOT_A_STATE, Fault.NONE]
+
+
+def test_the_patience_is_checked(setting: Setting) -> None:
+    with pytest.raises(InvalidValueError, match="patience"):
+        Supervisor(setting[0].arm, setting[1], patience=0.0)
