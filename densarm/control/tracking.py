@@ -12,12 +12,15 @@ from densarm.control.disturbance_observer import (
     AHEAD_ANGLE,
     AHEAD_VELOCITY,
     DISTURBANCE,
+    FREE,
     ActuationParameters,
 )
+from densarm.control.evasion import Evasion
 from densarm.control.inverse_dynamics import (
     ATTRACT,
     BRAKE,
     EFFORT_LIMIT,
+    RATE_LIMIT,
     TORQUE,
     VELOCITY_LIMIT,
     InverseDynamics,
@@ -138,6 +141,7 @@ class DensityTracking:
             self.velocity(0.0, self.goal, np.zeros(arm.nv))
             return
         unlimited = np.full(arm.nv, math.inf)
+        self._evasion, self._is_evading = Evasion(world, unsafe[0].pairs, motion.margin), False
         self._dynamics = InverseDynamics(arm, unlimited, self._kinematics, motion.period, actuation)
         self._numbers = np.zeros(_N_NUMBERS)
         kappa = distance.kappa if isinstance(distance, TorusDistance) else math.nan
@@ -180,7 +184,28 @@ class DensityTracking:
             *dynamics.terms,
             dynamics.sent,
         )
+        if self._evasion.is_needed():
+            self._evade(q)
         return np.array(dynamics.rows[TORQUE])
+
+    def _evade(self, q: Array) -> None:
+        """Replace the torque by one that gives way, where the reference's velocity would not."""
+        numbers, rows, sample = self._numbers, self._dynamics.rows, self._sample
+        gain, rate = 40.0, self._gains.rate
+        v, error = rows[AHEAD_VELOCITY].copy(), sample[_ERROR]
+        limits = self._arm.limits
+        back = np.minimum(rate * np.abs(error), np.sqrt(0.5 * limits.acceleration * np.abs(error)))
+        nominal = numbers[_RATE] * sample[_VELOCITY] - np.copysign(back, error)
+        wanted, violated = self._evasion.velocity(q, v, nominal, gain)
+        self.log = (violated, wanted, nominal)
+        off = np.abs(v - numbers[_RATE] * sample[_VELOCITY]).max()
+        is_back = np.abs(error).max() < 0.003 and off < 0.05
+        self._is_evading = violated or (self._is_evading and not is_back)
+        if self._is_evading:
+            if violated:
+                rows[BRAKE] = 0.0
+            rows[ATTRACT] = gain * (wanted - v)
+            _evading_torque(numbers, rows, *self._dynamics.terms, self._dynamics.sent)
 
     @property
     def reference_time(self) -> float:
@@ -279,6 +304,26 @@ def _sensed_off(
 
 def _worth_sensing(wanted: Array, least: float, most: float) -> Array:
     return np.where(wanted < least, -np.inf, np.minimum(wanted, most))
+
+
+@compiled
+def _evading_torque(
+    numbers: Array, rows: Array, mass: Array, nonlinear: Array, gravity: Array, sent: Array
+) -> None:
+    n, share = nonlinear.shape[0], 1.0
+    for i in range(n):
+        tau = nonlinear[i] - rows[DISTURBANCE, i]
+        for j in range(n):
+            entry = mass[i, j] if i <= j else mass[j, i]
+            tau += entry * (rows[BRAKE, j] + rows[ATTRACT, j])
+        limit = rows[EFFORT_LIMIT, i]
+        change = min(max(tau, -limit), limit) - rows[FREE, i] - gravity[i]
+        rows[TORQUE, i] = change
+        if abs(change) * share > rows[RATE_LIMIT, i]:
+            share = rows[RATE_LIMIT, i] / abs(change)
+    for i in range(n):
+        rows[TORQUE, i] = rows[FREE, i] + gravity[i] + share * rows[TORQUE, i]
+    send(gravity, rows, sent)
 
 
 _POSITION, _VELOCITY, _ACCELERATION, _ERROR, _WEIGHTS = 0, 1, 2, 3, 4  # rows of a sample
