@@ -1,7 +1,7 @@
 """DensityTracking: the density inverse-dynamics controller along a motion."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -12,20 +12,19 @@ from densarm.control.disturbance_observer import (
     AHEAD_ANGLE,
     AHEAD_VELOCITY,
     DISTURBANCE,
-    FREE,
     ActuationParameters,
 )
-from densarm.control.evasion import Evasion
+from densarm.control.evasion import EVADING_GAIN, Evasion
 from densarm.control.inverse_dynamics import (
     ATTRACT,
     BRAKE,
     EFFORT_LIMIT,
-    RATE_LIMIT,
     TORQUE,
     VELOCITY_LIMIT,
     InverseDynamics,
     robust_torque,
     send,
+    straight_torque,
 )
 from densarm.density.goal_distance import GoalDistance, TorusDistance, torus_distance
 from densarm.density.navigation_density import (
@@ -85,6 +84,9 @@ class DensityTracking:
 
     both beyond a dead zone: unknown torque leaves less for accelerations, which go with σ̇².
 
+    Where obstacles move, the velocity of the reference and of a return to it is led by `Evasion`,
+    and a servo follows that inside the acceleration limits, until the arm is back.
+
     `velocity` tracks it with a plant that is told velocities, which needs no masses:
 
     .. math::
@@ -102,6 +104,7 @@ class DensityTracking:
         density: α, θ and gauge; tracking lives at e = 0, where nothing may be singular or flat.
         sensing: largest sensing distances, and their share of the distance kept on the way.
         actuation: how late torque is, and how far the model is trusted.
+        evasion: makes what gives way to obstacles that move, as the class `Evasion`.
 
     Attributes:
         motion: as given.
@@ -125,6 +128,7 @@ class DensityTracking:
         density: DensityParameters = DensityParameters(),
         sensing: SensingParameters = SensingParameters(),
         actuation: ActuationParameters = ActuationParameters(),
+        evasion: Callable[[World, ActivePairs, float], Evasion] = Evasion,
     ) -> None:
         require_smooth_goal(density, may_blend=False)
         arm = world.arm
@@ -141,7 +145,7 @@ class DensityTracking:
             self.velocity(0.0, self.goal, np.zeros(arm.nv))
             return
         unlimited = np.full(arm.nv, math.inf)
-        self._evasion, self._is_evading = Evasion(world, unsafe[0].pairs, motion.margin), False
+        self._evasion, self._is_evading = evasion(world, unsafe[0].pairs, motion.margin), False
         self._dynamics = InverseDynamics(arm, unlimited, self._kinematics, motion.period, actuation)
         self._numbers = np.zeros(_N_NUMBERS)
         kappa = distance.kappa if isinstance(distance, TorusDistance) else math.nan
@@ -189,23 +193,25 @@ class DensityTracking:
         return np.array(dynamics.rows[TORQUE])
 
     def _evade(self, q: Array) -> None:
-        """Replace the torque by one that gives way, where the reference's velocity would not."""
+        """Replace the torque by one that gives way, and that returns to the reference.
+
+        It returns no faster than it can stop, and hands over where little is left to return.
+        """
         numbers, rows, sample = self._numbers, self._dynamics.rows, self._sample
-        gain, rate = 40.0, self._gains.rate
-        v, error = rows[AHEAD_VELOCITY].copy(), sample[_ERROR]
-        limits = self._arm.limits
-        back = np.minimum(rate * np.abs(error), np.sqrt(0.5 * limits.acceleration * np.abs(error)))
-        nominal = numbers[_RATE] * sample[_VELOCITY] - np.copysign(back, error)
-        wanted, violated = self._evasion.velocity(q, v, nominal, gain)
-        self.log = (violated, wanted, nominal)
-        off = np.abs(v - numbers[_RATE] * sample[_VELOCITY]).max()
-        is_back = np.abs(error).max() < 0.003 and off < 0.05
-        self._is_evading = violated or (self._is_evading and not is_back)
+        error, follow = sample[_ERROR], numbers[_RATE] * sample[_VELOCITY]
+        off = np.abs(error)
+        stopping = np.sqrt(_RETURN_SHARE * self._arm.limits.acceleration * off)
+        back = np.copysign(np.minimum(self._gains.rate * off, stopping), error)
+        v = rows[AHEAD_VELOCITY]
+        wanted, gives_way = self._evasion.velocity(q, v, follow - back)
+        is_off = off.max() > _HANDED_OVER[0] or np.abs(v - follow).max() > _HANDED_OVER[1]
+        self._is_evading = gives_way or (self._is_evading and bool(is_off))
         if self._is_evading:
-            if violated:
+            if gives_way:
                 rows[BRAKE] = 0.0
-            rows[ATTRACT] = gain * (wanted - v)
-            _evading_torque(numbers, rows, *self._dynamics.terms, self._dynamics.sent)
+            rows[ATTRACT] = EVADING_GAIN * (wanted - v)
+            dynamics = self._dynamics
+            straight_torque(*dynamics.terms, dynamics.rows, dynamics.sent)
 
     @property
     def reference_time(self) -> float:
@@ -306,31 +312,14 @@ def _worth_sensing(wanted: Array, least: float, most: float) -> Array:
     return np.where(wanted < least, -np.inf, np.minimum(wanted, most))
 
 
-@compiled
-def _evading_torque(
-    numbers: Array, rows: Array, mass: Array, nonlinear: Array, gravity: Array, sent: Array
-) -> None:
-    n, share = nonlinear.shape[0], 1.0
-    for i in range(n):
-        tau = nonlinear[i] - rows[DISTURBANCE, i]
-        for j in range(n):
-            entry = mass[i, j] if i <= j else mass[j, i]
-            tau += entry * (rows[BRAKE, j] + rows[ATTRACT, j])
-        limit = rows[EFFORT_LIMIT, i]
-        change = min(max(tau, -limit), limit) - rows[FREE, i] - gravity[i]
-        rows[TORQUE, i] = change
-        if abs(change) * share > rows[RATE_LIMIT, i]:
-            share = rows[RATE_LIMIT, i] / abs(change)
-    for i in range(n):
-        rows[TORQUE, i] = rows[FREE, i] + gravity[i] + share * rows[TORQUE, i]
-    send(gravity, rows, sent)
-
-
 _POSITION, _VELOCITY, _ACCELERATION, _ERROR, _WEIGHTS = 0, 1, 2, 3, 4  # rows of a sample
 
 # Numbers of the kernel: the reference's time σ, how far it is behind, and its derivatives.
 _TIME, _LAG, _RATE, _CHANGE, _ELAPSED, _LOG_PSI = 0, 1, 2, 3, 4, 5
 _PERIOD, _DELAY, _KAPPA, _POSITION_GAIN, _VELOCITY_GAIN, _N_NUMBERS = 6, 7, 8, 9, 10, 11
+
+_RETURN_SHARE = 0.5  # of twice the acceleration limits, with which a return to the reference stops
+_HANDED_OVER = 0.003, 0.05  # of error and velocity, [rad or m] and per s, that tracking takes over
 
 _CLOCK_RATE = 20.0  # ω [1/s]
 _WAITING_ERROR, _FREE_ERROR = 0.03, 0.005  # ε, and what the reference does not wait for [rad or m]
