@@ -16,13 +16,13 @@ from densarm.values.kernels import compiled, compiled_part
 from densarm.world.active_pairs import ActivePairs, pair_motion
 from densarm.world.distance_view import add_pair_gradient, pair_rate
 from densarm.world.pair_queries import PairQueries
-from densarm.world.stopping import HELD_SHARE
 from densarm.world.world import World
 
 EVADING_GAIN = 40.0
 """K_v of the servo that follows an evading velocity [1/s]."""
 
-_TIMES = 6  # at which misses are looked for, one a call in turn
+_LIMIT_SHARE = 0.85  # of velocities and accelerations, since torque lags behind by its rate
+_TIMES = 6  # at which misses are looked for, one every other call in turn
 _LAG = 0.04  # [s] until a velocity that is asked for is reached
 _SOONEST = 0.03  # [s] in which a miss is made good
 _FASTEST = 1e3  # [rad/s or m/s], where joints have no limit
@@ -32,7 +32,7 @@ _BRAKE_SHARE = 0.5  # of the accelerations, that a stop before what stands recko
 _STANDING_WEIGHT = 10.0  # of what is known for sure, where not all rows can hold
 _SOFTNESS = 1e-4  # reciprocal weight of rows
 _LEAST_SHARE = 1e-5  # of σ, of h where the bump is evaluated
-_MISS_REACH = 0.25  # [m] beyond which a miss is no row
+_MISS_REACH = 0.12  # [m] beyond which a miss is no row
 _UNBOUNDED = 1e30  # as daqp has it
 
 
@@ -112,7 +112,9 @@ class Evasion:
         n, size = arm.nv, (_TIMES + 1) * world.n_pairs
         # Blocks of rows of the density, and of misses at each time; how many in each; all in reach.
         self._rows, self._chosen = np.zeros((size, n + 1)), np.zeros((size, n + 1))
-        self._count, self._turn = np.zeros(_TIMES + 1, np.int64), 0
+        self._count = np.zeros(_TIMES + 1, np.int64)
+        self._turn, self._looks = 0, False
+        self._obstacle_of = world.pair_shapes[:, 1].tolist()
         self._near = np.zeros(world.n_pairs, np.int64)
         self._hessian, self._upper = np.eye(n), np.full(size, _UNBOUNDED)
         self._sense = np.where(np.arange(n + size) < n, 0, 8).astype(np.int32)  # soft beyond bounds
@@ -122,8 +124,8 @@ class Evasion:
         self._queries = PairQueries(arm.model, geometry, world.pair_shapes, remembers=False)
         limits, turns = arm.limits, arm.continuous
         lower, upper = np.where(turns, -np.inf, limits.lower), np.where(turns, np.inf, limits.upper)
-        speed = np.minimum(limits.velocity, _FASTEST)
-        self._limits = np.array([lower, upper, speed, HELD_SHARE * limits.acceleration])
+        speed = _LIMIT_SHARE * np.minimum(limits.velocity, _FASTEST)
+        self._limits = np.array([lower, upper, speed, _LIMIT_SHARE * limits.acceleration])
         self._density = np.array([margin, p.distance, p.decay, p.margin, p.reaction])
 
     def is_needed(self) -> bool:
@@ -179,7 +181,8 @@ class Evasion:
             self._limits,
             self._rows,
         )
-        if horizon > 0.0:
+        self._looks = not self._looks and horizon > 0.0
+        if self._looks:
             self._turn = self._turn % _TIMES + 1
             self._count[self._turn] = self._look_ahead(v, angles, horizon * self._turn / _TIMES)
 
@@ -204,17 +207,23 @@ class Evasion:
         there = np.minimum(np.maximum(angles + ahead * v, self._limits[0]), self._limits[1])
         pin.computeJointJacobians(arm.model, self._data, arm.configurations(there))
         pin.updateGeometryPlacements(arm.model, self._data, world.geometry_model, data)
-        shapes = world.pair_shapes[near, 1].tolist()
-        for shape, k in dict(zip(shapes, near.tolist(), strict=True)).items():
-            pose, twist = data.oMg[shape], world.twist[k]
-            moved = pose.translation + ahead * (twist[:3] + np.cross(twist[3:], pose.translation))
-            data.oMg[shape] = pin.SE3(pin.exp3(ahead * twist[3:]) @ pose.rotation, moved)
+        for shape, k in {self._obstacle_of[k]: k for k in near.tolist()}.items():
+            data.oMg[shape] = _pose_ahead(data.oMg[shape], world.twist[k], ahead)
         self._queries.ask(near)
         begin, soon = self._turn * world.n_pairs, max(ahead - _LAG, _SOONEST)
         numbers, rows = np.array([miss, soon]), self._queries.rows
         return int(
             _miss_rows(near, rows, self._jacobian, world.sign, v, numbers, self._rows[begin:])
         )
+
+
+def _pose_ahead(pose: pin.SE3, twist: Array, ahead: float) -> pin.SE3:
+    """Return where a body is in some time [s], of a velocity as in `ChangingObstacles.twist`."""
+    linear, angular = twist[:3], twist[3:]
+    if not angular.any():
+        return pin.SE3(pose.rotation, pose.translation + ahead * linear)
+    moved = pose.translation + ahead * (linear + np.cross(angular, pose.translation))
+    return pin.SE3(pin.exp3(ahead * angular) @ pose.rotation, moved)
 
 
 @compiled

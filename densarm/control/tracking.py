@@ -138,14 +138,15 @@ class DensityTracking:
         self._arm = arm
         self._kinematics = Kinematics(arm)
         distance = goal_distance or TorusDistance(arm)
-        unsafe = [*_sensed_off(world, motion, sensing, self._kinematics), *unsafe_sets]
+        pairs, joints = _sensed_off(world, motion, sensing, self._kinematics)
+        unsafe = [pairs, joints, *unsafe_sets]
         self._density = NavigationDensity(arm, self.goal, unsafe, distance, density)
         self._gains = gains
         if arm.links_without_mass:
             self.velocity(0.0, self.goal, np.zeros(arm.nv))
             return
         unlimited = np.full(arm.nv, math.inf)
-        self._evasion, self._is_evading = evasion(world, unsafe[0].pairs, motion.margin), False
+        self._evasion, self._is_evading = evasion(world, pairs.pairs, motion.margin), False
         self._dynamics = InverseDynamics(arm, unlimited, self._kinematics, motion.period, actuation)
         self._numbers = np.zeros(_N_NUMBERS)
         kappa = distance.kappa if isinstance(distance, TorusDistance) else math.nan
@@ -207,9 +208,10 @@ class DensityTracking:
         is_off = off.max() > _HANDED_OVER[0] or np.abs(v - follow).max() > _HANDED_OVER[1]
         self._is_evading = gives_way or (self._is_evading and bool(is_off))
         if self._is_evading:
-            if gives_way:
-                rows[BRAKE] = 0.0
-            rows[ATTRACT] = EVADING_GAIN * (wanted - v)
+            most = HELD_SHARE * self._arm.limits.acceleration
+            ahead = 0.0 if gives_way else rows[BRAKE]
+            rows[ATTRACT] = np.clip(EVADING_GAIN * (wanted - v) + ahead, -most, most)
+            rows[BRAKE] = 0.0
             dynamics = self._dynamics
             straight_torque(*dynamics.terms, dynamics.rows, dynamics.sent)
 
@@ -285,7 +287,7 @@ def require_smooth_goal(
 
 def _sensed_off(
     world: World, motion: Motion, sensing: SensingParameters, kinematics: Kinematics
-) -> tuple[UnsafeSet, UnsafeSet]:
+) -> tuple[ClearanceSet, JointLimitSet]:
     """Return pairs and joint limits, sensed nowhere on a motion but where the arm is off it.
 
     Those that the motion comes nearer than it is tracked are not sensed.
@@ -319,7 +321,7 @@ _TIME, _LAG, _RATE, _CHANGE, _ELAPSED, _LOG_PSI = 0, 1, 2, 3, 4, 5
 _PERIOD, _DELAY, _KAPPA, _POSITION_GAIN, _VELOCITY_GAIN, _N_NUMBERS = 6, 7, 8, 9, 10, 11
 
 _RETURN_SHARE = 0.5  # of twice the acceleration limits, with which a return to the reference stops
-_HANDED_OVER = 0.003, 0.05  # of error and velocity, [rad or m] and per s, that tracking takes over
+_HANDED_OVER = 0.001, 0.02  # of error and velocity, [rad or m] and per s, that tracking takes over
 
 _CLOCK_RATE = 20.0  # ω [1/s]
 _WAITING_ERROR, _FREE_ERROR = 0.03, 0.005  # ε, and what the reference does not wait for [rad or m]
