@@ -206,6 +206,7 @@ class DensityTracking:
         v = rows[AHEAD_VELOCITY]
         wanted, gives_way = self._evasion.velocity(q, v, follow - back)
         is_off = off.max() > _HANDED_OVER[0] or np.abs(v - follow).max() > _HANDED_OVER[1]
+        is_off |= self.is_moving and abs(1.0 - numbers[_RATE]) > _HANDED_OVER[1]
         self._is_evading = gives_way or (self._is_evading and bool(is_off))
         if self._is_evading:
             most = HELD_SHARE * self._arm.limits.acceleration
@@ -321,7 +322,7 @@ _TIME, _LAG, _RATE, _CHANGE, _ELAPSED, _LOG_PSI = 0, 1, 2, 3, 4, 5
 _PERIOD, _DELAY, _KAPPA, _POSITION_GAIN, _VELOCITY_GAIN, _N_NUMBERS = 6, 7, 8, 9, 10, 11
 
 _RETURN_SHARE = 0.5  # of twice the acceleration limits, with which a return to the reference stops
-_HANDED_OVER = 0.001, 0.02  # of error and velocity, [rad or m] and per s, that tracking takes over
+_HANDED_OVER = 0.001, 0.02  # of error, and of velocity or rate, that tracking takes over from
 
 _CLOCK_RATE = 20.0  # ω [1/s]
 _WAITING_ERROR, _FREE_ERROR = 0.03, 0.005  # ε, and what the reference does not wait for [rad or m]
