@@ -186,6 +186,56 @@ def motionbenchmaker(problems: Path, every: int, **options: Any) -> None:
     finish()
 
 
+@bench.command()
+@click.option("--arm", default="panda", show_default=True, help="A name of `densarm list`.")
+@number_option("--obstacles", 1, "Balls; from two on around a table and a wall.")
+@click.option("--speed", type=float, default=1.0, show_default=True, help="Of the balls [m/s].")
+@number_option("--trials", 20, "Trials of each method.")
+@number_option("--seed", 0, "Seed of the first trial, the next one's being one more.", least=0)
+@click.option(
+    "--methods",
+    default="density,damper_qp,stop_and_go",
+    show_default=True,
+    help="What gives way, separated by commas; also density_near, without looking ahead.",
+)
+@click.option("--resting", is_flag=True, help="The arm is to stay where it is.")
+@number_option("--jobs", 1, "Processes.")
+@output_option("--json", "FILE", "Write the figures as JSON.")
+def moving(methods: str, json: Path | None, **options: Any) -> None:
+    """Aim balls of 80 mm radius at an arm, by one method after another.
+
+    Each ball is aimed at a link where the motion has it, and would hit it. Trials are the same for
+    all methods, which differ in what gives way alone. A contact ends a run; it has reached if the
+    arm is at the goal within 4 s after the balls have passed.
+
+    The exit status is 0 when all trials were run, whatever was touched.
+
+    \b
+    Example:
+      densarm bench moving --arm ur5 --obstacles 4 --speed 1.0 --trials 50 --json moving.json
+    """  # noqa: D301
+    with progress() as report:
+        report("loading")
+        from densarm.study.moving import run_trials, to_json
+
+        chosen = [name.strip() for name in methods.split(",")]
+        outcomes = run_trials(methods=chosen, on_progress=report, **options)
+        if json:
+            write_json(json, to_json(outcomes))
+    rows = [
+        {
+            "method": method,
+            "contacts": str(found.contacts),
+            "while moving": str(found.moving_contacts),
+            "reached": str(found.reached),
+            "of": str(found.trials),
+            "step [µs]": f"{found.step_us:.0f}",
+        }
+        for method, found in outcomes.items()
+    ]
+    print_table(rows, "")
+
+
 def _run_set(
     problems: Sequence[MotionProblem],
     report: Callable[[str], None],

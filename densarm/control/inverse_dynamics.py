@@ -259,6 +259,37 @@ def robust_torque(
         rows[TORQUE, i] = _clipped(tau, rows[EFFORT_LIMIT, i])
 
 
+@compiled
+def straight_torque(
+    mass: Array, nonlinear: Array, gravity: Array, rows: Array, sent: Array
+) -> None:
+    """Write and send the torque of two accelerations, as far as all torques can change at once.
+
+    Where the torque rate binds, the change keeps its direction: an arm in which each joint changes
+    by as much as it may would accelerate elsewhere than it is told.
+
+    Args:
+        mass: M, upper triangle (nv, nv).
+        nonlinear: H (nv,).
+        gravity: of it (nv,).
+        rows: `BRAKE` and `ATTRACT`; `TORQUE` is written.
+        sent: as `InverseDynamics.sent`.
+    """
+    n, share = nonlinear.shape[0], 1.0
+    for i in range(n):
+        tau = nonlinear[i] - rows[DISTURBANCE, i]
+        for j in range(n):
+            entry = mass[i, j] if i <= j else mass[j, i]
+            tau += entry * (rows[BRAKE, j] + rows[ATTRACT, j])
+        change = _clipped(tau, rows[EFFORT_LIMIT, i]) - rows[FREE, i] - gravity[i]
+        rows[TORQUE, i] = change
+        if abs(change) * share > rows[RATE_LIMIT, i]:
+            share = rows[RATE_LIMIT, i] / abs(change)
+    for i in range(n):
+        rows[TORQUE, i] = rows[FREE, i] + gravity[i] + share * rows[TORQUE, i]
+    send(gravity, rows, sent)
+
+
 @compiled_part
 def _clipped(x: float, most: float) -> float:
     return most if x > most else -most if x < -most else x

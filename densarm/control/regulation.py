@@ -10,9 +10,9 @@ from densarm.arms.arm import Arm
 from densarm.control.controller import Gains, checked_state
 from densarm.control.disturbance_observer import ActuationParameters
 from densarm.control.inverse_dynamics import InverseDynamics
+from densarm.control.sensing import require_smooth_goal
 from densarm.control.speed_law import SpeedLaw, SpeedParameters
 from densarm.control.stopping import BackupFilter
-from densarm.control.tracking import require_smooth_goal
 from densarm.density.goal_distance import GoalDistance, InertiaDistance, TorusDistance
 from densarm.density.navigation_density import DensityParameters
 from densarm.density.sub_goals import GuidedDensity, GuidePath, SubGoals

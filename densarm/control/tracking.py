@@ -1,7 +1,7 @@
 """DensityTracking: the density inverse-dynamics controller along a motion."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -14,6 +14,7 @@ from densarm.control.disturbance_observer import (
     DISTURBANCE,
     ActuationParameters,
 )
+from densarm.control.evasion import EVADING_GAIN, Evasion
 from densarm.control.inverse_dynamics import (
     ATTRACT,
     BRAKE,
@@ -24,35 +25,28 @@ from densarm.control.inverse_dynamics import (
     InverseDynamics,
     robust_torque,
     send,
+    straight_torque,
 )
+from densarm.control.sensing import require_smooth_goal, sensed_off
 from densarm.density.goal_distance import GoalDistance, TorusDistance, torus_distance
 from densarm.density.navigation_density import (
     DensityParameters,
-    Gauge,
     NavigationDensity,
     write_gauge_gradient,
 )
 from densarm.density.unsafe_sets import (
-    ClearanceSet,
-    JointLimitSet,
     SensingParameters,
     UnsafeSet,
 )
-from densarm.errors import InvalidValueError
 from densarm.planning.motion import Motion, MotionSample, write_sample
 from densarm.values.arrays import Array
 from densarm.values.kernels import compiled
 from densarm.world.active_pairs import ActivePairs
-from densarm.world.near_pairs import least_distances
 from densarm.world.stopping import HELD_SHARE
-from densarm.world.world import DISTANCE_TOLERANCE, World
+from densarm.world.world import World
 
 TRACKING_GAINS = Gains(position=1400.0, velocity=80.0)
 """Of tracking, whose feedback no cap on accelerations weakens."""
-
-_INTERVAL = 0.02  # [s] of the motion between computed distances
-# Sensing distances below which the feedback of a small error would shake the arm.
-_LEAST_DISTANCE, _LEAST_JOINT_DISTANCE = 1e-3, 5e-3  # [m], [rad or m]
 
 
 class DensityTracking:
@@ -84,6 +78,9 @@ class DensityTracking:
 
     both beyond a dead zone: unknown torque leaves less for accelerations, which go with σ̇².
 
+    Where obstacles move, the velocity of the reference and of a return to it is led by `Evasion`,
+    and a servo follows that inside the acceleration limits, until the arm is back.
+
     `velocity` tracks it with a plant that is told velocities, which needs no masses:
 
     .. math::
@@ -101,6 +98,7 @@ class DensityTracking:
         density: α, θ and gauge; tracking lives at e = 0, where nothing may be singular or flat.
         sensing: largest sensing distances, and their share of the distance kept on the way.
         actuation: how late torque is, and how far the model is trusted.
+        evasion: makes what gives way to obstacles that move, as the class `Evasion`.
 
     Attributes:
         motion: as given.
@@ -124,6 +122,7 @@ class DensityTracking:
         density: DensityParameters = DensityParameters(),
         sensing: SensingParameters = SensingParameters(),
         actuation: ActuationParameters = ActuationParameters(),
+        evasion: Callable[[World, ActivePairs, float], Evasion] = Evasion,
     ) -> None:
         require_smooth_goal(density, may_blend=False)
         arm = world.arm
@@ -133,7 +132,8 @@ class DensityTracking:
         self._arm = arm
         self._kinematics = Kinematics(arm)
         distance = goal_distance or TorusDistance(arm)
-        unsafe = [*_sensed_off(world, motion, sensing, self._kinematics), *unsafe_sets]
+        pairs, joints = sensed_off(world, motion, sensing, self._kinematics)
+        unsafe: list[UnsafeSet] = [pairs, joints, *unsafe_sets]
         self._goes_on_from: float | None = None
         self._density = NavigationDensity(arm, self.goal, unsafe, distance, density)
         self._gains = gains
@@ -142,6 +142,7 @@ class DensityTracking:
             self.velocity(0.0, self.goal, np.zeros(arm.nv))
             return
         unlimited = np.full(arm.nv, math.inf)
+        self._evasion, self._is_evading = evasion(world, pairs.pairs, motion.margin), False
         self._dynamics = InverseDynamics(arm, unlimited, self._kinematics, motion.period, actuation)
         kappa = distance.kappa if isinstance(distance, TorusDistance) else math.nan
         constants = motion.period, actuation.delay, kappa, gains.position, gains.velocity
@@ -191,7 +192,34 @@ class DensityTracking:
             *dynamics.terms,
             dynamics.sent,
         )
+        if self._evasion.is_needed():
+            self._evade(q)
         return np.array(dynamics.rows[TORQUE])
+
+    def _evade(self, q: Array) -> None:
+        """Replace the torque by one that gives way, and that returns to the reference.
+
+        It returns no faster than it can stop, and hands over where little is left to return.
+        """
+        numbers, rows, sample = self._numbers, self._dynamics.rows, self._sample
+        error, follow = sample[_ERROR], numbers[_RATE] * sample[_VELOCITY]
+        off = np.abs(error)
+        stopping = np.sqrt(_EVADED_SHARE * self._arm.limits.acceleration * off)
+        back = np.copysign(np.minimum(self._gains.rate * off, stopping), error)
+        v = rows[AHEAD_VELOCITY]
+        wanted, gives_way = self._evasion.velocity(q, v, follow - back)
+        is_off = off.max() > _HANDED_OVER[0] or np.abs(v - follow).max() > _HANDED_OVER[1]
+        is_off |= self.is_moving and abs(1.0 - numbers[_RATE]) > _HANDED_OVER[1]
+        self._is_evading = gives_way or (self._is_evading and bool(is_off))
+        if self._is_evading:
+            numbers[_EMERGENCY] = 0.0
+            rows[RATE_LIMIT] = numbers[_ELAPSED] * self._arm.limits.torque_rate
+            most = HELD_SHARE * self._arm.limits.acceleration
+            ahead = 0.0 if gives_way else rows[BRAKE]
+            rows[ATTRACT] = np.clip(EVADING_GAIN * (wanted - v) + ahead, -most, most)
+            rows[BRAKE] = 0.0
+            dynamics = self._dynamics
+            straight_torque(*dynamics.terms, dynamics.rows, dynamics.sent)
 
     def pause(self) -> None:
         """Let the reference's clock come to rest, so that the arm rests on the motion."""
@@ -279,59 +307,6 @@ class DensityTracking:
         return attract
 
 
-def require_smooth_goal(
-    density: DensityParameters, *, may_blend: bool, form: str = "tracking"
-) -> None:
-    """Refuse a density whose gradient is singular or flat at the goal, or a blend not to be read.
-
-    The form of control is for the error.
-
-    Raises:
-        InvalidValueError: such a density.
-    """
-    is_smooth = density.gauge == Gauge.RECIPROCAL and density.alpha == 1.0
-    reason = (
-        f"in gauge {str(density.gauge)!r} with alpha = {density.alpha:g}, whose gradient is "
-        "singular or flat at the goal (or use gauge 'reciprocal', alpha = 1)"
-    )
-    if not may_blend and density.blend_radius > 0.0:
-        allowed = "0 in tracking, which lives at e = 0, where a blend leaves nothing of obstacles"
-        raise InvalidValueError("density.blend_radius", density.blend_radius, allowed)
-    if not is_smooth and not may_blend:
-        raise InvalidValueError("control.form", form, f"'regulation' or 'plain' {reason}")
-    if not is_smooth and density.blend_radius == 0.0:
-        raise InvalidValueError("density.blend_radius", 0.0, f"above 0 {reason}")
-
-
-def _sensed_off(
-    world: World, motion: Motion, sensing: SensingParameters, kinematics: Kinematics
-) -> tuple[UnsafeSet, UnsafeSet]:
-    """Return pairs and joint limits, sensed nowhere on a motion but where the arm is off it.
-
-    Those that the motion comes nearer than it is tracked are not sensed.
-    """
-    arm = world.arm
-    every = max(1, round(_INTERVAL / motion.period))
-    angles = np.vstack([motion.position[::every], motion.position[-1:]])
-    configurations = arm.configurations(angles)
-    held = motion.margin + DISTANCE_TOLERANCE
-    limit = held + sensing.distance / sensing.path_share  # beyond which all are sensed alike
-    least = least_distances(world, configurations, limit) - held
-    angles = arm.angles(configurations)
-    inside = np.minimum(angles - arm.limits.lower, arm.limits.upper - angles).min(axis=0)
-    near = ActivePairs(world, kinematics)
-    pairs = ClearanceSet(world, motion.margin, sensing.distance, near, sensing.distance)
-    joints = JointLimitSet(arm, sensing.joint)
-    share = sensing.path_share * np.minimum(least, limit), sensing.path_share * inside
-    pairs.set_sensing_distance(_worth_sensing(share[0], _LEAST_DISTANCE, sensing.distance))
-    joints.set_sensing_distance(_worth_sensing(share[1], _LEAST_JOINT_DISTANCE, sensing.joint))
-    return pairs, joints
-
-
-def _worth_sensing(wanted: Array, least: float, most: float) -> Array:
-    return np.where(wanted < least, -np.inf, np.minimum(wanted, most))
-
-
 _POSITION, _VELOCITY, _ACCELERATION, _ERROR, _WEIGHTS, _MOST = 0, 1, 2, 3, 4, 5  # rows of a sample
 
 # Numbers of the kernel: the reference's time σ, how far it is behind, and its derivatives.
@@ -339,6 +314,9 @@ _TIME, _LAG, _RATE, _CHANGE, _EMERGENCY, _ELAPSED = 0, 1, 2, 3, 4, 5
 _CLOCK = slice(_LAG, _EMERGENCY + 1)
 _LOG_PSI, _PERIOD, _DELAY, _KAPPA, _POSITION_GAIN, _VELOCITY_GAIN = 6, 7, 8, 9, 10, 11
 _WANTED_RATE, _N_NUMBERS = 12, 13
+
+_EVADED_SHARE = 0.5  # of twice the acceleration limits, with which a return to the reference stops
+_HANDED_OVER = 0.001, 0.02  # of error, and of velocity or rate, that tracking takes over from
 
 _CLOCK_RATE = 20.0  # ω [1/s]
 _PAUSE_SHARE = 0.95  # of the acceleration limits, that pausing takes with the motion

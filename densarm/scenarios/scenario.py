@@ -15,8 +15,9 @@ from densarm.arms.joint_space import sliding_joints
 from densarm.certificates.task import PLANTS, Input, SimulationParameters, Task
 from densarm.control.controller import Gains
 from densarm.control.disturbance_observer import ActuationParameters
+from densarm.control.sensing import require_smooth_goal
 from densarm.control.speed_law import SpeedParameters
-from densarm.control.tracking import TRACKING_GAINS, require_smooth_goal
+from densarm.control.tracking import TRACKING_GAINS
 from densarm.density.goal_distance import KAPPA_MIN, TorusDistance, joint_weights
 from densarm.density.navigation_density import DensityParameters
 from densarm.density.unsafe_sets import SensingParameters

@@ -141,3 +141,25 @@ def test_robot_of_other_joints(command: Command, collection: Path) -> None:
     assert done.status == 2
     assert "wrist" in done.err
     assert len(done.err.splitlines()) == 1
+
+
+@pytest.mark.slow
+def test_moving_reports_its_keys(command: Command, tmp_path: Path) -> None:
+    path, methods = tmp_path / "moving.json", "density,stop_and_go"
+    done = command("bench", "moving", "--trials", 2, "--methods", methods, "--json", path)
+    assert (done.status, done.err) == (0, "")
+    told = json.loads(path.read_text(encoding="utf-8"))["methods"]
+    assert list(told) == methods.split(",")
+    for found in told.values():
+        assert list(found) == ["trials", "contacts", "reached", "moving_contacts", "step_us"]
+        assert found["trials"] == 2
+        assert found["contacts"] + found["reached"] <= 2
+        assert found["step_us"] > 0.0
+    assert told["density"]["contacts"] == 0
+
+
+def test_moving_refuses_an_unknown_method(command: Command) -> None:
+    done = command("bench", "moving", "--methods", "hope")
+    assert done.status == 2
+    assert done.err.count("\n") == 1
+    assert "density" in done.err

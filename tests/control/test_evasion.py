@@ -1,0 +1,154 @@
+"""Evasion: rows that hold where they can, balls that miss, and scenes that stand."""
+
+import numpy as np
+import pytest
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+from scipy.optimize import linprog
+
+from densarm.arms.arm import Arm
+from densarm.control.evasion import EVADING_GAIN, Evasion, EvasionParameters
+from densarm.control.tracking import DensityTracking
+from densarm.density.inverse_bump import log_inverse_bump
+from densarm.errors import InvalidValueError
+from densarm.planning.motion import Motion
+from densarm.scene.motion import ConstantVelocity
+from densarm.scene.obstacles import Sphere
+from densarm.scene.scene import Scene
+from densarm.simulation.run import Run
+from densarm.simulation.simulate import simulate
+from densarm.study.moving import draw_trial
+from densarm.values.arrays import Array
+from densarm.values.outcome import Outcome
+from densarm.world.active_pairs import ActivePairs
+from densarm.world.world import World
+
+PLAIN = EvasionParameters(horizon=0.0)
+
+
+class Blind(Evasion):
+    """Sees nothing that moves."""
+
+    def is_needed(self) -> bool:
+        return False
+
+
+class Unasked(Evasion):
+    """Is not to be asked for a velocity."""
+
+    def velocity(self, q: Array, v: Array, nominal: Array) -> tuple[Array, bool]:  # noqa: ARG002
+        raise AssertionError
+
+
+@pytest.fixture(scope="module")
+def with_ball(panda: Arm) -> World:
+    """The Panda beside a ball, from far away."""
+    return World(panda, Scene([Sphere(name="ball", radius=0.08, position=(0.0, 0.0, 5.0))]))
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    at=st.tuples(*[st.floats(-0.9, 0.9)] * 3),
+    velocity=st.tuples(*[st.floats(-1.0, 1.0)] * 3),
+    nominal=st.tuples(*[st.floats(-0.3, 0.3)] * 7),
+)
+def test_rows_of_the_density_hold_unless_no_velocity_in_reach_keeps_them(
+    with_ball: World, at: Array, velocity: Array, nominal: Array
+) -> None:
+    world, arm = with_ball, with_ball.arm
+    q = arm.postures["ready"]
+    world.move_obstacle("ball", (0.0, 0.0, 5.0))
+    evasion = Evasion(world, pairs := ActivePairs(world), 0.0, PLAIN)
+    world.move_obstacle("ball", at, velocity=velocity)
+    assert evasion.is_needed()
+    pairs.update(q)
+    sample = world.clearance(q)
+    assume(sample.distance.min() > 0.02)
+    found, _ = evasion.velocity(q, np.zeros(arm.nv), np.array(nominal))
+    most = 0.85 * arm.limits.acceleration / EVADING_GAIN
+    assert (np.abs(found) <= most + 1e-9).all()
+    slopes, bounds = [], []
+    for k, names in enumerate(world.pairs):
+        h = sample.distance[k] - PLAIN.margin - PLAIN.reaction * max(-sample.rate[k], 0.0)
+        if "ball" in names and 1e-3 < h < PLAIN.distance:
+            slope = log_inverse_bump(h, PLAIN.distance, 0.0)[1]
+            slopes.append(sample.gradient[k])
+            bounds.append(-PLAIN.decay / slope - sample.rate[k])
+    lack = np.array(bounds) - np.array(slopes).reshape(-1, arm.nv) @ found
+    if (lack > 2e-3).any():  # rows are soft
+        limits = list(zip(-most, most, strict=True))
+        assert not linprog(
+            np.zeros(arm.nv), -np.array(slopes), -np.array(bounds), bounds=limits
+        ).success
+
+
+@pytest.fixture(scope="module")
+def crossing_runs() -> dict[type[Evasion], Run]:
+    """A ball of 1 m/s that would hit the moving Panda, with and without what evades it."""
+    from densarm.arms.arm import load_arm
+
+    trial = draw_trial(load_arm("panda", shapes="capsule"), 1, 1.0, 1)
+    start = trial.arm.configurations(trial.motion.position[0])
+    runs = {}
+    for evasion in (Evasion, Blind):
+        world = World(trial.arm, trial.scene)
+        controller = DensityTracking(world, trial.motion, evasion=evasion)
+        runs[evasion] = simulate(world, controller, start)
+    return runs
+
+
+@pytest.mark.slow
+def test_a_ball_that_crosses_is_evaded_and_the_run_is_proved(
+    crossing_runs: dict[type[Evasion], Run],
+) -> None:
+    run = crossing_runs[Evasion]
+    assert (run.outcome, run.detail) == (Outcome.REACHED, "")
+    assert run.clearance.min() > 0.01
+    assert run.certified
+
+
+@pytest.mark.slow
+def test_the_same_ball_hits_an_arm_that_does_not_see_it(
+    crossing_runs: dict[type[Evasion], Run],
+) -> None:
+    assert crossing_runs[Blind].outcome == Outcome.COLLIDED
+
+
+@pytest.mark.slow
+def test_evading_stays_inside_the_limits(crossing_runs: dict[type[Evasion], Run]) -> None:
+    run, limits = crossing_runs[Evasion], crossing_runs[Evasion].task.arm.limits
+    assert (np.abs(run.tau) <= limits.effort).all()
+    assert (np.abs(run.v) <= 1.02 * limits.velocity).all()
+    gravity = np.array(
+        [run.task.arm.nonlinear_effects(q, 0.0 * v) for q, v in zip(run.q, run.v, strict=True)]
+    )
+    change = np.abs(np.diff(run.tau - gravity, axis=0))
+    assert (change <= 1e-3 * limits.torque_rate + 1e-9).all()
+
+
+def test_nothing_is_asked_where_nothing_moves(panda: Arm, panda_swing: Motion) -> None:
+    scene = Scene([Sphere(name="ball", radius=0.08, position=(0.9, 0.0, 0.9))])
+    torques = []
+    for evasion in (Unasked, Evasion):
+        tracking = DensityTracking(World(panda, scene), panda_swing, evasion=evasion)
+        q, v = panda.configurations(panda_swing.position[0] + 0.01), np.zeros(panda.nv)
+        torques.append([tracking.torque(0.001 * k, q, v) for k in range(20)])
+    assert np.array_equal(*torques)
+
+
+def test_an_arm_at_rest_is_left_alone_by_what_passes_far_away(
+    panda: Arm, panda_swing: Motion
+) -> None:
+    away = ConstantVelocity(linear=(0.0, 0.0, 1.0))
+    far = Sphere(name="ball", radius=0.08, position=(3.0, 0.0, 0.0), motion=away)
+    q, v = panda.configurations(panda_swing.position[0]), np.zeros(panda.nv)
+    moving, without = (
+        DensityTracking(World(panda, Scene(obstacles)), panda_swing) for obstacles in ([far], [])
+    )
+    assert np.allclose(moving.torque(0.0, q, v), without.torque(0.0, q, v), atol=1e-9)
+
+
+@pytest.mark.parametrize("key", ["distance", "decay", "margin", "reaction", "horizon", "miss"])
+def test_a_negative_parameter_is_refused(key: str) -> None:
+    with pytest.raises(InvalidValueError, match=key):
+        EvasionParameters(**{key: -1.0})
