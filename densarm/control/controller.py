@@ -15,6 +15,7 @@ from densarm.values.kernels import compiled
 
 _FLOAT = np.dtype(np.float64)
 _NO_STATE = np.empty(0)
+_ROUNDING = 1e-9  # relative, of torques at their limits
 _UNIT_TOLERANCE = 1e-6  # of cos² + sin² of a continuous joint
 
 
@@ -92,4 +93,27 @@ def _is_state(q: Array, v: Array, joint_index: NDArray[np.int64]) -> bool:
             off = q[k] * q[k] + q[k + 1] * q[k + 1] - 1.0
         if not (abs(off) < _UNIT_TOLERANCE and math.isfinite(v[i])):
             return False
+    return True
+
+
+@compiled
+def is_plausible(q: Array, v: Array, farthest: float, fastest: Array) -> bool:
+    """Return whether q (nq,) is within a distance [rad or m], and |v| below `fastest` (nv,)."""
+    is_plausible = True
+    for x in q:
+        is_plausible &= abs(x) <= farthest
+    for i in range(v.size):
+        is_plausible &= abs(v[i]) <= fastest[i]
+    return is_plausible
+
+
+@compiled
+def takes_torque(tau: Array, limit: Array, out: Array) -> bool:
+    """Copy a torque if it is finite and within the limits up to rounding, clipped to them."""
+    for i in range(tau.size):
+        if not (math.isfinite(tau[i]) and abs(tau[i]) <= limit[i] * (1.0 + _ROUNDING)):
+            return False
+    for i in range(tau.size):
+        most = limit[i]
+        out[i] = most if tau[i] > most else -most if tau[i] < -most else tau[i]
     return True

@@ -7,7 +7,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from densarm.arms.arm import Arm
-from densarm.control.controller import Controller, Gains, checked_state
+from densarm.control.controller import (
+    Controller,
+    Gains,
+    checked_state,
+    is_plausible,
+    takes_torque,
+)
 from densarm.control.course import Course
 from densarm.control.inverse_dynamics import InverseDynamics
 from densarm.control.state_observer import StateObserver, Tolerances
@@ -16,7 +22,6 @@ from densarm.control.stopping import StopAndHold
 from densarm.planning.motion import Motion
 from densarm.values.arrays import Array
 from densarm.values.checks import positive
-from densarm.values.kernels import compiled
 
 HOLDING_GAINS = Gains(position=50.0, velocity=15.0)
 """Stable with a delay of 50 ms in the state, by a phase margin of 33 degrees."""
@@ -25,7 +30,6 @@ _FASTEST = 10.0  # of the velocity limits: beyond it a number is no velocity
 _UNLIMITED_FASTEST = 100.0  # [rad/s or m/s]
 _FARTHEST = 1e6  # [rad or m]
 _LONGEST_PREDICTION = 0.25  # [s]
-_ROUNDING = 1e-9  # relative, of torques at their limits
 _SLOW = 0.01  # [rad/s or m/s], which counts as rest
 
 
@@ -115,7 +119,7 @@ class Supervisor:
         self._state = arm.configuration(np.zeros(arm.nv)), np.zeros(arm.nv)
         if not self._is_trusting:  # kernels are loaded, or compiled, here rather than in a loop
             self._brake.begin(*self._state)
-            _takes(self._tau, arm.limits.effort, self._tau)
+            takes_torque(self._tau, arm.limits.effort, self._tau)
             self._observer = StateObserver(arm, self._fastest, self._tolerances)
             self._candidate = StateObserver(arm, self._fastest, self._tolerances)
             self._measured(0.0, *self._state)
@@ -296,7 +300,7 @@ class Supervisor:
         except Exception as error:  # noqa: BLE001  # a caller may give anything
             self._stop(Fault.NOT_A_STATE, f"At t = {t} s, {_one_line(error)}.")
             return None
-        if _is_plausible(q, v, _FARTHEST, self._fastest):
+        if is_plausible(q, v, _FARTHEST, self._fastest):
             return q, v
         largest = f"velocities up to {np.abs(v).max():.3g}, positions up to {np.abs(q).max():.3g}"
         self._stop(Fault.NOT_A_STATE, f"At t = {t} s the state is beyond reason: {largest}.")
@@ -366,7 +370,7 @@ class Supervisor:
             self._stop(Fault.OFF_COURSE, sentence, pauses=not is_astray)
         if off and not self._pauses:
             return False
-        if tau.shape == limit.shape and _takes(tau, limit, self._tau):
+        if tau.shape == limit.shape and takes_torque(tau, limit, self._tau):
             return True
         why = f"{_one_line(tau)}, and the limits are {_one_line(limit)}"
         self._stop(Fault.NO_TORQUE, f"At t = {t} s the controller gave {why}.")
@@ -378,17 +382,13 @@ class Supervisor:
         return getattr(self.controller, "dynamics", None)
 
     def _controllers_torque(self, t: float, q: ArrayLike, v: ArrayLike, dt: float) -> Array:
-        own, self._called = self._own_time(t), True
+        self._began = t if self._began is None else self._began
+        own, self._called = t - self._began, True
         if self._handed_over is not None:
             if (dynamics := self._dynamics) is not None:
                 dynamics.take_over(self._handed_over, own - dt)
             self._handed_over = None
         return self.controller.torque(own, q, v)
-
-    def _own_time(self, t: float) -> float:
-        if self._began is None:
-            self._began = t
-        return t - self._began
 
     def _brake_or_hold(self, dt: float) -> None:
         if not self._knows_state:
@@ -402,31 +402,9 @@ class Supervisor:
             self._brakes_anew, self._has_braked = False, True
             dt = 0.0 if self._called else dt
         tau = self._brake.torque(*self._state, dt)
-        if not _takes(tau, self._arm.limits.effort, self._tau):
+        if not takes_torque(tau, self._arm.limits.effort, self._tau):
             self._tau[:] = 0.0
 
 
 def _one_line(text: object) -> str:
     return " ".join(str(text).split())[:300]
-
-
-@compiled
-def _is_plausible(q: Array, v: Array, farthest: float, fastest: Array) -> bool:
-    is_plausible = True
-    for x in q:
-        is_plausible &= abs(x) <= farthest
-    for i in range(v.size):
-        is_plausible &= abs(v[i]) <= fastest[i]
-    return is_plausible
-
-
-@compiled
-def _takes(tau: Array, limit: Array, out: Array) -> bool:
-    """Copy a torque if it is finite and within the limits up to rounding, clipped to them."""
-    for i in range(tau.size):
-        if not (math.isfinite(tau[i]) and abs(tau[i]) <= limit[i] * (1.0 + _ROUNDING)):
-            return False
-    for i in range(tau.size):
-        most = limit[i]
-        out[i] = most if tau[i] > most else -most if tau[i] < -most else tau[i]
-    return True
