@@ -382,17 +382,13 @@ class Supervisor:
         return getattr(self.controller, "dynamics", None)
 
     def _controllers_torque(self, t: float, q: ArrayLike, v: ArrayLike, dt: float) -> Array:
-        own, self._called = self._own_time(t), True
+        self._began = t if self._began is None else self._began
+        own, self._called = t - self._began, True
         if self._handed_over is not None:
             if (dynamics := self._dynamics) is not None:
                 dynamics.take_over(self._handed_over, own - dt)
             self._handed_over = None
         return self.controller.torque(own, q, v)
-
-    def _own_time(self, t: float) -> float:
-        if self._began is None:
-            self._began = t
-        return t - self._began
 
     def _brake_or_hold(self, dt: float) -> None:
         if not self._knows_state:

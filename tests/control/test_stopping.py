@@ -68,9 +68,8 @@ def test_it_stops_on_a_straight_line_in_the_time_of_the_trajectory_and_holds(
 
 def test_a_second_stop_remembers_no_disturbance_of_the_first() -> None:
     stop, ways = StopAndHold(ARM, Gains(), DT), []
-    for speed in (REST, np.array([1.0, -1.0]), np.array([1.0, -1.0])):
-        v = speed
-        q, start = ARM.configuration([0.3, -0.2]), ARM.configuration([0.3, -0.2])
+    for begun in (REST, np.array([1.0, -1.0]), np.array([1.0, -1.0])):
+        v, q, start = begun, ARM.configuration([0.3, -0.2]), ARM.configuration([0.3, -0.2])
         stop.begin(q, v)
         for k in range(400):
             q, v_next = step(ARM, q, v, stop.torque(q, v, DT if k else 0.0))

@@ -480,10 +480,11 @@ class Panda:
         self.motion, self.scenario = motion, scenario
         self.faults: list[Fault] = []
         self.goal, self.is_moving = scenario.goal, True
-        self.stop_at, self.at_once, self.seen = math.inf, False, lambda _, q: q
+        self.stop_at, self.at_once = math.inf, False
+        self.seen: Callable[[float, Any], Any] = lambda _, q: q
         self.off: list[Array] = []
 
-    def torque(self, t: float, q: Array, v: Array) -> Array:
+    def torque(self, t: float, q: Any, v: Any) -> Array:
         if t >= self.stop_at:
             self.supervisor.stop(at_once=self.at_once)
             self.stop_at = math.inf
