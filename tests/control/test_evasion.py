@@ -119,7 +119,9 @@ def test_evading_stays_inside_the_limits(crossing_runs: dict[type[Evasion], Run]
     run, limits = crossing_runs[Evasion], crossing_runs[Evasion].task.arm.limits
     assert (np.abs(run.tau) <= limits.effort).all()
     assert (np.abs(run.v) <= 1.02 * limits.velocity).all()
-    gravity = np.array([run.task.arm.nonlinear_effects(q, 0.0 * v) for q, v in zip(run.q, run.v, strict=True)])
+    gravity = np.array(
+        [run.task.arm.nonlinear_effects(q, 0.0 * v) for q, v in zip(run.q, run.v, strict=True)]
+    )
     change = np.abs(np.diff(run.tau - gravity, axis=0))
     assert (change <= 1e-3 * limits.torque_rate + 1e-9).all()
 
