@@ -137,7 +137,7 @@ def test_it_begins_anew_where_time_jumps_or_runs_back(arm: Arm) -> None:
 def test_another_one_goes_on_from_what_was_found(arm: Arm) -> None:
     loop = at_rest(arm).run(0.1, np.full(arm.nv, 1.0))
     other = InverseDynamics(arm, arm.limits.acceleration, None, DT, USUAL)
-    other.take_over(loop.dynamics)
+    other.take_over(loop.dynamics, loop.t - DT)
     for dynamics in (loop.dynamics, other):
         dynamics.update(loop.t, loop.q, loop.v)
     np.testing.assert_array_equal(other.disturbance, loop.dynamics.disturbance)
