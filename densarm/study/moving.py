@@ -33,7 +33,7 @@ _RADIUS = 0.08  # of a ball [m]
 _DRAWS = 100
 _AIMED_FROM = 3  # the first joint whose links are aimed at
 _COLUMN = 0.25  # [m] that balls stay off what joints 1 and 2 alone could move aside
-_CLEAR = 0.05  # [m] that the ends keep
+_CLEAR, _OWN_CLEAR = 0.05, 0.01  # [m] that the ends keep from what stands, and links apart
 _BEGIN = 0.05, 0.35  # [m] of a ball from the start, and more per m/s up to 1 m/s
 _STEP = 1.5  # largest change of a joint [rad]
 _TURN = 2.5  # largest angle of start and goal [rad]
@@ -205,11 +205,13 @@ def draw_trial(arm: Arm, obstacles: int, speed: float, seed: int, resting: bool 
     standing = _furniture(workspace) if obstacles > 1 else Scene()
     world, limits = World(arm, standing), arm.limits
     lower, upper = np.maximum(limits.lower + 0.1, -_TURN), np.minimum(limits.upper - 0.1, _TURN)
+    is_own = world.pair_shapes[:, 1] < len(arm.collision_model.geometryObjects)
+    keep = np.where(is_own, _OWN_CLEAR, _CLEAR)
     for _ in range(_DRAWS):
         begin = np.clip(arm.angles(workspace.draw(random)), lower, upper)
         end = np.clip(begin + random.uniform(-_STEP, _STEP, arm.nv), lower, upper)
         ends = arm.configurations(begin), arm.configurations(end)
-        if min(world.distances(q).min(initial=np.inf) for q in ends) < _CLEAR:
+        if any((world.distances(q) < keep).any() for q in ends):
             continue
         motion = Motion(_PERIOD, np.tile(begin, (2, 1)), np.zeros((2, arm.nv)))
         if not resting:
