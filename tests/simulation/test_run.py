@@ -30,7 +30,7 @@ ARRAYS = ("time", "q", "v", "tau", "clearance")
 @pytest.fixture(scope="module")
 def short(swing_up_run: Run) -> Run:
     """The first samples of a run, for files that are quick to write."""
-    cut: Any = {name: getattr(swing_up_run, name)[:20] for name in ARRAYS}
+    cut: Any = {name: getattr(swing_up_run, name)[:20] for name in (*ARRAYS, "reference")}
     return replace(swing_up_run, **cut)
 
 
@@ -59,7 +59,7 @@ def error_of(path: Path) -> str:
 def test_round_trip_is_exact(swing_up_run: Run, tmp_path: Path) -> None:
     swing_up_run.save(tmp_path / "run.npz")
     loaded = Run.load(tmp_path / "run.npz")
-    for name in ARRAYS:
+    for name in (*ARRAYS, "reference", "tube"):
         np.testing.assert_array_equal(getattr(loaded, name), getattr(swing_up_run, name))
     for name in ("outcome", "detail", "plan_time", "preparation_time", "tracking_error"):
         assert getattr(loaded, name) == getattr(swing_up_run, name)
@@ -69,7 +69,7 @@ def test_round_trip_is_exact(swing_up_run: Run, tmp_path: Path) -> None:
 
 
 def test_loads_without_pickle_and_holds_a_json_task(content: Content) -> None:
-    assert set(content) == {*ARRAYS, "scenario", "result"}
+    assert set(content) == {*ARRAYS, "reference", "tube", "scenario", "result"}
     scenario = json.loads(str(content["scenario"]))
     simulation = scenario["simulation"]
     assert {"dt", "integrator", "control_divisor"} <= set(simulation)
@@ -300,6 +300,7 @@ def test_summary(swing_up_run: Run) -> None:
         "plan_time_s",
         "preparation_time_s",
         "certified",
+        "tube_rad",
         "plant",
         "disturbances",
     ]
