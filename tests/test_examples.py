@@ -119,7 +119,7 @@ def test_reading_a_run(
     run_example(monkeypatch, "reading_a_run.py", str(tmp_path / "run.npz"), "--out", str(tmp_path))
     out = capsys.readouterr().out
     assert "reached" in out
-    assert out.count(" proved: ") == 6
+    assert out.count(" proved: ") == 7
     assert "not proved" not in out
     assert f"{swing_up_run.clearance[0] * 1e3:.1f} mm" in out
     pictures = {"reading_a_run.png", "reading_a_run_plot.png"}
@@ -190,6 +190,6 @@ def test_own_mujoco_model(
     run_example(monkeypatch, "own_mujoco_model.py")
     out = capsys.readouterr().out
     assert out.startswith("reached")
-    assert float(out.split()[1]) > 0.001  # [rad]
+    assert float(out.split()[1]) < 0.002  # [rad], since what differs is found and cancelled
     assert "swept     True" in out
     assert "replay    None: does not apply" in out

@@ -81,6 +81,9 @@ class ProblemResult:
     """Whether the certificate holds in every part."""
     led_by: str = ""
     """What found the way, as a phrase."""
+    tube_rad: Sequence[float] | None = None
+    """Bounds on the tracking error of each joint under which the motion stays proved clear
+    [rad or m]; None without a motion."""
     plant: str = PLANTS[0]
     """What was driven."""
     disturbances: Mapping[str, Any] = field(default_factory=dict)

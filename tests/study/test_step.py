@@ -87,7 +87,7 @@ def test_full_sensing_leaves_the_spheres_and_feels_them_near_the_motion() -> Non
             law.torque(t + 1.0, q, v)  # time runs back then: each state is the first that is known
             taus.append(law.torque(t, q, v))
         differs.append(np.abs(taus[0] - taus[1]).max())
-    assert min(differs) < 1e-3 < max(differs)
+    assert min(differs) < 0.1 * max(differs)
 
 
 @pytest.mark.slow
