@@ -69,7 +69,7 @@ def test_a_constant_torque_is_found_within_time_constants(
         speed[:nv],
         ActuationParameters(bandwidth=bandwidth, velocity_noise=0.0),
     )
-    loop.run(10.0 / bandwidth, d)
+    loop.run(15.0 / bandwidth, d)
     np.testing.assert_allclose(loop.dynamics.disturbance, d, rtol=0.01, atol=0.02)
 
 
