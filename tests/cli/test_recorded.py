@@ -13,7 +13,7 @@ from densarm.scenarios.scenario import Scenario
 from densarm.simulation.run import Run
 
 Command = Callable[..., Any]
-CHECKS = ["swept", "start", "goal", "limits", "replay", "stopping"]
+CHECKS = ["swept", "start", "goal", "limits", "replay", "stopping", "tube"]
 
 
 def altered(saved: Path, path: Path, **changes: Callable[..., Any]) -> Path:

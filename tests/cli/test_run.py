@@ -27,6 +27,7 @@ KEYS = [
     "plan_time_s",
     "preparation_time_s",
     "certified",
+    "tube_rad",
     "plant",
     "disturbances",
 ]
