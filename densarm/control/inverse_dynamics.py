@@ -207,11 +207,20 @@ def _send(gravity: Array, rows: Array, sent: Array) -> None:
 
 @compiled_part
 def send(gravity: Array, rows: Array, sent: Array) -> None:
-    """Limit the change of `TORQUE` beside gravity (nv,) to `RATE_LIMIT`, and keep it as sent."""
+    """Limit the change of `TORQUE` beside gravity (nv,) to `RATE_LIMIT`, and keep it as sent.
+
+    Where the rate binds, the change keeps its direction: an arm in which each joint changes by as
+    much as it may would accelerate elsewhere than it is told.
+    """
+    share = 1.0
+    for i in range(gravity.shape[0]):
+        change = abs(rows[TORQUE, i] - rows[FREE, i] - gravity[i])
+        if change * share > rows[RATE_LIMIT, i]:
+            share = rows[RATE_LIMIT, i] / change
     for i in range(gravity.shape[0]):
         tau, before = rows[TORQUE, i], rows[FREE, i] + gravity[i]
-        if abs(tau - before) > rows[RATE_LIMIT, i]:
-            tau = before + math.copysign(rows[RATE_LIMIT, i], tau - before)
+        if share < 1.0:
+            tau = before + share * (tau - before)
         tau = _clipped(tau, rows[EFFORT_LIMIT, i])
         rows[TORQUE, i] = tau
         sent[-1, i] = tau
@@ -263,10 +272,7 @@ def robust_torque(
 def straight_torque(
     mass: Array, nonlinear: Array, gravity: Array, rows: Array, sent: Array
 ) -> None:
-    """Write and send the torque of two accelerations, as far as all torques can change at once.
-
-    Where the torque rate binds, the change keeps its direction: an arm in which each joint changes
-    by as much as it may would accelerate elsewhere than it is told.
+    """Write and send the torque of two accelerations.
 
     Args:
         mass: M, upper triangle (nv, nv).
@@ -275,18 +281,13 @@ def straight_torque(
         rows: `BRAKE` and `ATTRACT`; `TORQUE` is written.
         sent: as `InverseDynamics.sent`.
     """
-    n, share = nonlinear.shape[0], 1.0
+    n = nonlinear.shape[0]
     for i in range(n):
         tau = nonlinear[i] - rows[DISTURBANCE, i]
         for j in range(n):
             entry = mass[i, j] if i <= j else mass[j, i]
             tau += entry * (rows[BRAKE, j] + rows[ATTRACT, j])
-        change = _clipped(tau, rows[EFFORT_LIMIT, i]) - rows[FREE, i] - gravity[i]
-        rows[TORQUE, i] = change
-        if abs(change) * share > rows[RATE_LIMIT, i]:
-            share = rows[RATE_LIMIT, i] / abs(change)
-    for i in range(n):
-        rows[TORQUE, i] = rows[FREE, i] + gravity[i] + share * rows[TORQUE, i]
+        rows[TORQUE, i] = _clipped(tau, rows[EFFORT_LIMIT, i])
     send(gravity, rows, sent)
 
 
