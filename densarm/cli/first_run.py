@@ -5,13 +5,7 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
-
-if TYPE_CHECKING:
-    from densarm.planning.guide import GuidePath
-    from densarm.values.arrays import Array
 
 
 @contextmanager
@@ -42,29 +36,22 @@ def compile_meanwhile() -> None:
     """Hold an arm still and draw a line, which proves no segment and searches no path."""
     import numpy as np
 
-    from densarm.scenarios.run import run
+    from densarm.control.tracking import DensityTracking
+    from densarm.planning.motion import Motion
+    from densarm.scenarios.run import records
     from densarm.scenarios.scenario import load_scenario
+    from densarm.simulation.simulate import simulate
     from densarm.visualization.camera import Camera
     from densarm.visualization.rasterizer import Rasterizer
 
     scenario = load_scenario("swing_up")
-    control = replace(scenario.control, path_margin=0.0)
-    run(replace(scenario, goal=scenario.start, control=control), guide=_Stay())
+    world, start = scenario.world, scenario.start
+    rest = np.tile(scenario.arm.angles(start), (2, 1))
+    motion = Motion(scenario.simulation.control_period, rest, np.zeros_like(rest))
+    records(simulate(world, DensityTracking(world, motion), start, start))
     corners = np.eye(3)
     picture = Rasterizer(Camera.facing(corners), 8, 8)
     picture.lines(corners[np.newaxis, :2], color=(0.0, 0.0, 0.0), width=1.0, opacity=1.0)
-
-
-class _Stay:
-    """Supplies no way but the start, so that nothing needs a proof."""
-
-    def plan(self, start: "Array", goal: "Array", seed: int) -> "GuidePath":  # noqa: ARG002
-        """Act as `Guide.plan`."""
-        import numpy as np
-
-        from densarm.planning.guide import GuidePath
-
-        return GuidePath(np.stack([start, goal]), is_clear=True)
 
 
 def _is_compiled() -> bool:

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 from densarm.arms.arm import Arm
 from densarm.control.controller import Gains, checked_state
 from densarm.control.disturbance_observer import ActuationParameters
-from densarm.control.inverse_dynamics import TRUSTED, InverseDynamics
+from densarm.control.inverse_dynamics import InverseDynamics
 from densarm.control.sensing import require_smooth_goal
 from densarm.control.speed_law import SpeedLaw, SpeedParameters
 from densarm.control.stopping import BackupFilter
@@ -70,7 +70,7 @@ class FieldRegulation:
         gains: Gains = Gains(),
         period: float = 0.001,
         inertia_at: Array | None = None,
-        actuation: ActuationParameters = TRUSTED,
+        actuation: ActuationParameters = ActuationParameters(),
     ) -> None:
         self._arm = arm
         self._field = field
@@ -147,8 +147,7 @@ class DensityRegulation(FieldRegulation):
         density: α, θ, gauge and blend, and the weights of a `TorusDistance`.
         sensing: sensing distances.
         speed: parameters of the speed law.
-        actuation: how late torque is, and how far the model is trusted; by default wholly, since
-            with an observer the arm does not rest where the density stalls.
+        actuation: how late torque is, and how far the model is trusted.
 
     Attributes:
         goal: as given (nq,).
@@ -175,7 +174,7 @@ class DensityRegulation(FieldRegulation):
         density: DensityParameters = DensityParameters(),
         sensing: SensingParameters = SensingParameters(),
         speed: SpeedParameters = SpeedParameters(),
-        actuation: ActuationParameters = TRUSTED,
+        actuation: ActuationParameters = ActuationParameters(),
     ) -> None:
         require_smooth_goal(density, may_blend=True)
         arm = world.arm

@@ -183,6 +183,7 @@ def _plan(scenario: Scenario, world: World, start: Array, guide: Guide | None) -
             plain=is_plain,
             margin=control.margin,
             gains=scenario.law_gains,
+            actuation=scenario.actuation,
             period=period,
             goal_distance=None if is_plain else scenario.goal_distance,
             speed=scenario.speed,

@@ -180,11 +180,8 @@ def jumped(q: Array, v: Array) -> tuple[Array, Array]:
 )
 @pytest.mark.parametrize("fault_time", [0.005, 0.8])
 def test_a_wrong_state_stops_the_arm_where_it_was_going(
-    setting: Setting, seen: Seen, fault: Fault, fault_time: float, request: pytest.FixtureRequest
+    setting: Setting, seen: Seen, fault: Fault, fault_time: float
 ) -> None:
-    if seen is jumped and fault_time > 0.5:
-        reason = "believed in the end, it has the arm rest 0.4 rad from there: not understood yet"
-        request.applymarker(pytest.mark.xfail(reason=reason))
     loop = Loop(setting).run(0.4)
     q, v = loop.q, loop.v
     loop.run(fault_time, seen).run(0.8)

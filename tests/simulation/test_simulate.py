@@ -198,10 +198,10 @@ def test_a_supervised_run_is_judged_as_the_controllers_own(swing_up: Scenario) -
     assert run.outcome == Outcome.REACHED
     assert_judged_alike(run, simulate(world, Supervisor(arm, tracking), start))
     run, supervised = (
-        simulate(world, controller, start, parameters=Parameters(dt=0.005))
+        simulate(world, controller, start, parameters=Parameters(dt=0.002))
         for controller in (
-            DensityRegulation(world, swing_up.goal, period=0.005),
-            Supervisor(arm, DensityRegulation(world, swing_up.goal, period=0.005), 0.005),
+            DensityRegulation(world, swing_up.goal, period=0.002),
+            Supervisor(arm, DensityRegulation(world, swing_up.goal, period=0.002), 0.002),
         )
     )
     assert run.outcome == Outcome.STUCK
