@@ -32,7 +32,7 @@ os.environ["PYTHONSAFEPATH"] = "1"
 os.environ["PYTHONPATH"] = str(Path(densarm.__file__).parents[1])
 
 # The first call of a compiled function takes seconds, so a deadline would measure the compiler.
-settings.register_profile("densarm", deadline=None, derandomize="CI" in os.environ)
+settings.register_profile("densarm", deadline=None, max_examples=50, derandomize="CI" in os.environ)
 settings.load_profile("densarm")
 
 

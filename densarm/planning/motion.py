@@ -156,6 +156,9 @@ class PlanningError(DensarmError):
         super().__init__(f"{outcome}: {detail}")
 
 
+_ROUNDING = 1e-6  # of a period; at a knot the acceleration is that after it, however time rounds
+
+
 @compiled
 def _sample(u: float, u_acceleration: float, period: float, knots: Array, out: Array) -> None:
     write_sample(u, u_acceleration, period, knots, out)
@@ -174,8 +177,9 @@ def write_sample(u: float, u_acceleration: float, period: float, knots: Array, o
     y = 1.0 - x
     step, bump = x * x * (3.0 - 2.0 * x), x * y
     step_slope, slope_a, slope_b = 6.0 * bump / period, y * (1.0 - 3.0 * x), x * (3.0 * x - 2.0)
-    moves = 0.0 <= u_acceleration < last
-    m = math.floor(u_acceleration) if moves else 0
+    later = u_acceleration + _ROUNDING
+    moves = 0.0 <= u_acceleration and later < last
+    m = math.floor(later) if moves else 0
     z = 6.0 * (u_acceleration - m)
     k_next, m_next = k + 1, m + 1
     for j in range(knots.shape[2]):

@@ -117,7 +117,7 @@ known_arm = cache(partial(load_arm, shapes="capsule"))
 
 
 @pytest.mark.slow
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=40, deadline=None)
 @given(
     name=st.sampled_from(robot_names()),
     exponent=st.floats(-7.0, -1.0),
