@@ -178,7 +178,7 @@ def write_sample(u: float, u_acceleration: float, period: float, knots: Array, o
     step, bump = x * x * (3.0 - 2.0 * x), x * y
     step_slope, slope_a, slope_b = 6.0 * bump / period, y * (1.0 - 3.0 * x), x * (3.0 * x - 2.0)
     later = u_acceleration + _ROUNDING
-    moves = 0.0 <= u_acceleration and later < last
+    moves = u_acceleration >= 0.0 and later < last
     m = math.floor(later) if moves else 0
     z = 6.0 * (u_acceleration - m)
     k_next, m_next = k + 1, m + 1
