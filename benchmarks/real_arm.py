@@ -1,7 +1,9 @@
 """Drive arms that are not their models, in MuJoCo: do they reach, touch nothing and keep track?
 
     python benchmarks/real_arm.py panda.json --every 29 --jobs 2 --json real_arm.json
-    python benchmarks/real_arm.py panda.json --cases "payload 1,coulomb 0.5" --form regulation
+    python benchmarks/real_arm.py --cases "payload 1,coulomb 0.5" --form regulation
+    python benchmarks/real_arm.py panda.json --form computed_torque --json computed_torque.json
+    python benchmarks/real_arm_figure.py real_arm.json computed_torque.json real_arm.png
 
 The three Panda scenarios, and twelve problems of a MotionBenchMaker file, one of so many (without a
 file the scenarios alone; in regulation always). Each motion is planned once and run in every case
@@ -28,13 +30,16 @@ import densarm
 from densarm.certificates.task import REACHED_POSITION, REACHED_VELOCITY
 from densarm.cli.output import print_table
 from densarm.control.disturbance_observer import ActuationParameters
+from densarm.control.tracking import TRACKING_GAINS
 from densarm.planning.plan import plan_path
 from densarm.scene.loading import MotionProblem
 from densarm.simulation.disturbances import Disturbances, Push
+from densarm.study.baselines import ComputedTorque
 from densarm.study.problems import in_processes, scenario_of
 from densarm.values.outcome import Outcome
 from densarm.world.stopping import StoppingCheck, StoppingTrajectory
 
+FORMS = ("tracking", "regulation", "computed_torque")
 SCENARIOS = ("panda_table", "panda_shelf", "panda_holding_bar")
 PROBLEMS = 12  # of the file, at most
 PUSHES = 4  # of each problem
@@ -45,6 +50,11 @@ LONGEST = 5.0  # [s] after the motion's end
 def tracking(world: densarm.World, motion: densarm.Motion, delay: float) -> densarm.Controller:
     """The controller of a motion, told a delay [s]."""
     return densarm.DensityTracking(world, motion, actuation=ActuationParameters(delay=delay))
+
+
+def computed_torque(world: densarm.World, motion: densarm.Motion, delay: float) -> ComputedTorque:  # noqa: ARG001
+    """The classical controller of a motion, with the same gains, which knows of no delay."""
+    return ComputedTorque(world.arm, motion, TRACKING_GAINS)
 
 
 def regulation(
@@ -60,11 +70,16 @@ def regulation(
     )
 
 
-def off_reference(run: densarm.Run) -> tuple[float | None, float | None]:
+def off_reference(
+    run: densarm.Run, motion: densarm.Motion | None
+) -> tuple[float | None, float | None]:
     """Largest error of a joint against the reference where it was then [rad], and of its tube."""
-    if run.reference is None:
+    if motion is None:
         return None, None
-    off = np.abs(run.task.arm.angles(run.q) - run.reference)[:-1]
+    reference = run.reference
+    if reference is None:  # of a law whose clock never waits
+        reference = np.array([motion.sample(t).position for t in run.time])
+    off = np.abs(run.task.arm.angles(run.q) - reference)[:-1]
     return float(off.max()), None if run.tube is None else float((off / run.tube).max())
 
 
@@ -161,9 +176,10 @@ def run_cases(
     world, law = scenario.world, dict[str, Any](margin=scenario.control.margin, seed=scenario.seed)
     motion, moves = None, LONGEST
     make: Callable[[float], densarm.Controller]
-    if form == "tracking":
+    if form != "regulation":
         motion = densarm.plan_motion(world, scenario.start, scenario.goal, **law)
-        make, moves = partial(tracking, world, motion), motion.duration
+        law_of = tracking if form == "tracking" else computed_torque
+        make, moves = partial(law_of, world, motion), motion.duration
     else:
         path = plan_path(world, scenario.start, scenario.goal, **law).path
         make = partial(regulation, scenario, path)
@@ -191,7 +207,7 @@ def run_cases(
                     str(run.outcome),
                     run.detail,
                     ended_at_goal(run),
-                    *off_reference(run),
+                    *off_reference(run, motion),
                     None if run.tube is None else run.tube.tolist(),
                     run.goal_error,
                     float(run.clearance.min()),
@@ -258,13 +274,13 @@ def main() -> None:
     parser.add_argument("problems", nargs="?", type=Path, help="MotionBenchMaker's, in JSON")
     parser.add_argument("--every", type=int, default=29)
     parser.add_argument("--cases", help=f"names with commas between; of {', '.join(CASES)}")
-    parser.add_argument("--form", choices=["tracking", "regulation"], default="tracking")
+    parser.add_argument("--form", choices=FORMS, default=FORMS[0])
     parser.add_argument("--jobs", type=int, default=1)
     parser.add_argument("--json", type=Path)
     options = parser.parse_args()
     names = chosen(options.cases) if options.cases else list(CASES)
     known: list[str | MotionProblem] = [*SCENARIOS]
-    if options.problems and options.form == "tracking":
+    if options.problems and options.form != "regulation":
         known += densarm.load_problems(options.problems)[:: options.every][:PROBLEMS]
     results: list[Result] = []
     items = list(zip(known, range(len(known)), strict=True))

@@ -2,8 +2,11 @@ import re
 import runpy
 from pathlib import Path
 
+import numpy as np
+import pinocchio as pin
 import pytest
 
+import densarm
 from densarm.simulation.run import Run
 
 EXAMPLES = Path(__file__).parents[1] / "examples"
@@ -127,7 +130,7 @@ def test_reading_a_run(
 
 
 OWN_PARTS = ["own_controller", "own_guide", "own_goal_distance", "own_unsafe_set", "own_plant"]
-OWN_PARTS += ["own_mujoco_model"]
+OWN_PARTS += ["own_mujoco_model", "unknown_payload"]
 SWING_UPS = ["swing_up", "three_link_swing_up"]
 
 
@@ -193,3 +196,21 @@ def test_own_mujoco_model(
     assert float(out.split()[1]) < 0.002  # [rad], since what differs is found and cancelled
     assert "swept     True" in out
     assert "replay    None: does not apply" in out
+
+
+@pytest.mark.slow
+def test_unknown_payload(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    run_example(monkeypatch, "unknown_payload.py")
+    plain, density, found = capsys.readouterr().out.splitlines()
+    assert plain.startswith("computed torque: collided")
+    assert density.startswith("density: reached")
+    scenario = densarm.load_scenario("panda_shelf")
+    arm, frame = scenario.arm, pin.LOCAL_WORLD_ALIGNED
+    jacobian = pin.computeFrameJacobian(
+        arm.model, arm.data, scenario.goal, arm.end_effector_frame, frame
+    )
+    weight = -9.81 * jacobian[2]  # of a kilogram, as torques [N·m]
+    told = found.split(": ")[1].removesuffix(" N·m").split(", ")
+    np.testing.assert_allclose([float(torque) for torque in told], weight, atol=0.1)

@@ -17,6 +17,7 @@ from densarm.arms.joints import (
     JointLimits,
     joint_limits,
     only_joints,
+    rotor_inertia,
     without_joints,
     without_subtrees,
 )
@@ -50,6 +51,7 @@ class Arm:
         self.name = description.name
         models = build_models(description)
         self.model, self.collision_model = models.model, models.collision
+        self.model.armature = rotor_inertia(self.model, description)
         self._mesh_files = models.mesh_files
         self.origin: Array = models.origin
         """Point of the world that is the origin of the models (3,) [m].
@@ -292,6 +294,7 @@ def load_arm(
     acceleration: Vector | None = None,
     torque_rate: Vector | float | None = None,
     jerk: Vector | float | None = None,
+    armature: Vector | float | None = None,
 ) -> Arm:
     """Load an arm by name or from a URDF file.
 
@@ -329,13 +332,15 @@ def load_arm(
         torque_rate: limits of the change of torque, but for gravity's, (nv,) or one for all joints
             [N·m/s or N/s]; infinity for none; None for a known robot's own, or none.
         jerk: limits as those (nv,) [rad/s³ or m/s³].
+        armature: inertia of the joints' rotors, times their gears' ratios squared, (nv,) or one for
+            all joints [kg·m² or kg]; None for a known robot's own, or none.
 
     Raises:
         UnknownNameError: no such robot, or joint to move, lock or cut at.
         InvalidValueError: a locked position or base placement that is not finite, a locked joint
             that shall be in the arm, shapes, links to collide as drawn or an inertia of another
-            name, a density that is not positive or not read, or limits that are not positive or
-            of another length.
+            name, a density that is not positive or not read, limits that are not positive or of
+            another length, or a negative armature.
         FileContentError: a file that cannot be read.
         RobotDescriptionError: a URDF or SRDF that cannot be used.
     """
@@ -362,8 +367,13 @@ def load_arm(
         description = only_joints(description, _listed(joints), locked_joints or {})
     else:
         description = without_joints(description, locked_joints or {})
-    limits = {"acceleration": acceleration, "torque_rate": torque_rate, "jerk": jerk}
-    changes = {key: value for key, value in limits.items() if value is not None}
+    of_joints = {
+        "acceleration": acceleration,
+        "torque_rate": torque_rate,
+        "jerk": jerk,
+        "armature": armature,
+    }
+    changes = {key: value for key, value in of_joints.items() if value is not None}
     return Arm(replace(description, **changes))
 
 

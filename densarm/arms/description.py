@@ -47,6 +47,9 @@ class RobotDescription:
     for none, as infinity."""
     jerk: Vector | float | None = None
     """Jerk limits (nv,), or one for all [rad/s³ or m/s³]; None for none, as infinity."""
+    armature: Vector | float | None = None
+    """Inertia of rotors, times their gears' ratios squared, (nv,) or one for all [kg·m² or kg];
+    None for none."""
     end_effector: str | None = None
     """Frame whose path is drawn; None for the last link."""
     postures: Mapping[str, Vector] = field(default_factory=dict)
@@ -105,7 +108,7 @@ class RobotDescription:
             raise DensarmError(f"robot description: {error}") from None
 
 
-PER_JOINT = ("acceleration", "torque_rate", "jerk")
+PER_JOINT = ("acceleration", "torque_rate", "jerk", "armature")
 """Fields that hold one number per joint."""
 
 _ALWAYS_RECORDED = ("postures", "package_dirs", "base_placement", "acceleration")

@@ -13,7 +13,7 @@ from densarm.arms.self_collision import PAIR_ENTRIES
 from densarm.arms.urdf import Urdf, end_link
 from densarm.errors import InvalidValueError, RobotDescriptionError, UnknownNameError
 from densarm.values.arrays import Array
-from densarm.values.checks import finite_tuple, finite_vector, positive
+from densarm.values.checks import finite_tuple, finite_vector, non_negative, positive
 
 DEFAULT_ACCELERATION = 10.0
 """Acceleration limit where nothing is known [rad/s² or m/s²]; a URDF carries none."""
@@ -57,7 +57,8 @@ def joint_limits(
 
     Without masses nothing tells what torque a motion takes, so that no torque is limited.
     """
-    acceleration, torque_rate, jerk = (_given_limit(model, description, key) for key in PER_JOINT)
+    limits = ("acceleration", "torque_rate", "jerk")
+    acceleration, torque_rate, jerk = (_given_limit(model, description, key) for key in limits)
     joints = list(model.joints)[1:]
     index = [joint.idx_q for joint in joints]
     lower, upper = model.lowerPositionLimit[index], model.upperPositionLimit[index]
@@ -73,14 +74,27 @@ def joint_limits(
     )
 
 
+def rotor_inertia(model: pin.Model, description: RobotDescription) -> Array:
+    """Return the inertia of the joints' rotors (nv,) [kg·m² or kg]."""
+    if description.armature is None:
+        return np.zeros(model.nv)
+    given = _per_joint(model, description, "armature")
+    non_negative("armature", given.min())
+    return given
+
+
 def _given_limit(model: pin.Model, description: RobotDescription, key: str) -> Array:
     """Return a limit per joint (nv,), infinite where the description has none."""
-    value = getattr(description, key)
-    if value is None:
+    if getattr(description, key) is None:
         return np.full(model.nv, np.inf)
-    given = finite_vector(key, value if isinstance(value, tuple) else [value] * model.nv, model.nv)
+    given = _per_joint(model, description, key)
     positive(key, given.min())
     return given
+
+
+def _per_joint(model: pin.Model, description: RobotDescription, key: str) -> Array:
+    value = getattr(description, key)
+    return finite_vector(key, value if isinstance(value, tuple) else [value] * model.nv, model.nv)
 
 
 def without_joints(description: RobotDescription, locked: Mapping[str, float]) -> RobotDescription:

@@ -296,6 +296,7 @@ class _RobotTable:
     acceleration: tuple[float, ...] | None = None
     torque_rate: tuple[float, ...] | float | None = None
     jerk: tuple[float, ...] | float | None = None
+    armature: tuple[float, ...] | float | None = None
     shapes: str | None = None
     collision_from_visual: str | None = None
     inertia: str | None = None

@@ -98,6 +98,17 @@ def test_limits_of_ones_own() -> None:
         load_arm("panda", locked_joints=locked, jerk=[1.0] * 7)
 
 
+def test_rotors_add_their_inertia() -> None:
+    bare, rotors = load_arm("two_link"), np.array([0.1, 0.0])
+    arm = load_arm("two_link", armature=rotors)
+    q, v = bare.configuration([0.3, -1.0]), np.array([0.5, 2.0])
+    added = arm.mass_matrix(q) - bare.mass_matrix(q)
+    np.testing.assert_allclose(added, np.diag(rotors), atol=1e-15)
+    np.testing.assert_array_equal(arm.nonlinear_effects(q, v), bare.nonlinear_effects(q, v))
+    again = Arm(RobotDescription.from_json(arm.description.to_json()))
+    np.testing.assert_array_equal(again.mass_matrix(q), arm.mass_matrix(q))
+
+
 # From a file
 
 

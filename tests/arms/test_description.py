@@ -93,6 +93,7 @@ def test_xml() -> None:
         ({"acceleration": (1.0, float("nan"))}, "acceleration = .*finite"),
         ({"jerk": (1.0,)}, r"jerk = .*\(2,\), got \(1,\)"),
         ({"jerk": -1.0}, "jerk = -1.0: must be a finite number > 0"),
+        ({"armature": (0.1, -0.1)}, "armature = -0.1: must be a finite number >= 0"),
         ({"torque_rate": "fast"}, "torque_rate = .*: must be 2 numbers"),
         ({"torque_rate": (1.0, float("inf"))}, "torque_rate = .*finite"),
         ({"end_effector": "hook"}, "unknown end-effector frame 'hook'"),

@@ -71,9 +71,11 @@ def test_robot_may_collide_as_drawn(task: Path) -> None:
 
 
 def test_robot_may_have_limits_of_its_own(task: Path) -> None:
-    own = "acceleration = [3, 4]\ntorque_rate = 500\njerk = [20, 30]"
+    own = "acceleration = [3, 4]\ntorque_rate = 500\njerk = [20, 30]\narmature = [0.1, 0]"
     task.write_text(TASK.replace('"two_link"', f"'two_link'\n{own}"))
-    limits = load_scenario(task).arm.limits
+    arm = load_scenario(task).arm
+    np.testing.assert_array_equal(arm.model.armature, [0.1, 0.0])
+    limits = arm.limits
     np.testing.assert_array_equal(limits.acceleration, [3.0, 4.0])
     np.testing.assert_array_equal(limits.torque_rate, [500.0, 500.0])
     np.testing.assert_array_equal(limits.jerk, [20.0, 30.0])

@@ -106,8 +106,9 @@ def test_follows_obstacles_that_move_come_and_go() -> None:
     assert "large" in touching()
 
 
-def test_moves_as_the_model_does() -> None:
-    arm = load_arm("panda")
+@pytest.mark.parametrize("armature", [None, 0.1])
+def test_moves_as_the_model_does(armature: float | None) -> None:
+    arm = load_arm("panda", armature=armature)
     world = World(arm, Scene())
     plants = MujocoPlant(world, 1e-4), PinocchioPlant(arm, 1e-4)
     q, v = arm.postures["ready"], np.zeros(arm.nv)
