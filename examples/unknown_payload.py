@@ -12,7 +12,7 @@ def main() -> None:
     world, start = scenario.world, scenario.start
     motion = densarm.plan_motion(world, start, scenario.goal)
     tracking = densarm.DensityTracking(world, motion)
-    laws = {
+    laws: dict[str, densarm.Controller] = {
         "computed torque": ComputedTorque(world.arm, motion, scenario.law_gains),
         "density": tracking,
     }

@@ -214,3 +214,14 @@ def test_unknown_payload(
     weight = -9.81 * jacobian[2]  # of a kilogram, as torques [N·m]
     told = found.split(": ")[1].removesuffix(" N·m").split(", ")
     np.testing.assert_allclose([float(torque) for torque in told], weight, atol=0.1)
+
+
+def test_moving_goal(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    run_example(monkeypatch, "moving_goal.py")
+    clearance, lags = (
+        [float(word) for word in re.findall(r"[0-9.]+", line)]
+        for line in capsys.readouterr().out.splitlines()
+    )
+    assert 0.0 < clearance[0] < 60.0
+    assert 10.0 < lags[0] < 100.0
+    assert lags[1] < 0.1

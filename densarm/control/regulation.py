@@ -1,5 +1,6 @@
 """Regulation: controllers that follow a planning system q̇ = k(q) to the goal, without a clock."""
 
+import math
 from collections.abc import Sequence
 from typing import Protocol
 
@@ -20,6 +21,7 @@ from densarm.density.unsafe_sets import SensingParameters, UnsafeSet
 from densarm.errors import InvalidValueError
 from densarm.planning.plan import inside_limits
 from densarm.values.arrays import Array
+from densarm.values.checks import finite_vector
 from densarm.world.active_pairs import DistanceBounds
 from densarm.world.configurations import infeasibility
 from densarm.world.stopping import HELD_SHARE
@@ -28,6 +30,7 @@ from densarm.world.world import World
 
 _LEAVING_SPEED = 0.1  # [rad/s] at a critical point of ρ that is no maximum
 _NEAR = 1e-3  # [rad], below which a sub-goal's pull fades
+_GOES_ON = 0.1  # [s] for which a goal that moves goes on without being set again
 
 
 class VelocityField(Protocol):
@@ -76,6 +79,7 @@ class FieldRegulation:
         self._field = field
         self._speed_law = speed_law
         self._gain = gains.velocity
+        self._goal_velocity = np.zeros(arm.nv)  # which a field that knows of one writes
         self._scale = 0.0
         if inertia_at is not None:
             self._scale = 1.0 / float(arm.mass_matrix(inertia_at).diagonal().max())
@@ -112,7 +116,11 @@ class FieldRegulation:
 
     def _limited(self, q: Array, metric: Array | None) -> Array:
         velocity, way_left = self._field.velocity(q, metric)
-        return self._speed_law.limit(q, velocity, self._field.distances, way_left)
+        velocity = self._speed_law.limit(q, velocity, self._field.distances, way_left)
+        if not self._goal_velocity.any():
+            return velocity
+        with_goal = velocity + self._goal_velocity
+        return self._speed_law.limit(q, with_goal, self._field.distances, math.inf)
 
 
 class DensityRegulation(FieldRegulation):
@@ -150,7 +158,7 @@ class DensityRegulation(FieldRegulation):
         actuation: how late torque is, and how far the model is trusted.
 
     Attributes:
-        goal: as given (nq,).
+        goal: as given (nq,), or where it has moved to.
 
     Raises:
         InvalidValueError: a goal that touches something or is outside limits, or a density that is
@@ -188,21 +196,54 @@ class DensityRegulation(FieldRegulation):
         goals = SubGoals(self._check, path, sensing)
         self._guided = GuidedDensity(self._check, goals, goal_distance, density, tuple(unsafe_sets))
         self._density_field = _DensityField(self._guided, gains.rate)
+        self._set_goal, self._set_velocity, self._set_time = self.goal, np.zeros(arm.nv), math.nan
         inertia_at = path.waypoints[-1] if plain else None
         law = SpeedLaw(world, margin, speed)
         super().__init__(arm, self._density_field, law, gains, period, inertia_at, actuation)
 
-    def set_goal(self, goal: ArrayLike) -> None:
-        """Lead to another goal from the next call on, without sub-goals.
+    def set_goal(self, goal: ArrayLike, velocity: ArrayLike | None = None) -> None:
+        r"""Lead to another goal from the next call on, without sub-goals.
+
+        Where the goal moves, its velocity is added to the planning system, and the speed law
+        limits the sum: :math:`k + \dot q_{goal}` follows it without a lag.
 
         Args:
-            goal: configuration (nq,).
+            goal: configuration (nq,) that it has at the next call.
+            velocity: at which it goes on from there (nv,) [rad/s or m/s], for 0.1 s, after which it
+                rests unless it was set again; None for a goal at rest.
 
         Raises:
-            InvalidValueError: as for the class; the old goal is kept then.
+            InvalidValueError: as for the class, or a velocity of another length or not finite; the
+                old goal is kept then.
         """
-        self.goal = self._checked(goal)
+        checked, moves = self._checked(goal), np.zeros(self._arm.nv)
+        if velocity is not None:
+            moves = finite_vector("velocity", velocity, self._arm.nv)
+        self.goal = self._set_goal = checked
+        self._set_velocity, self._set_time = moves, math.nan
+        self._goal_velocity[:] = 0.0
         self._guided.lead_along(SubGoals(self._check, self._to_goal_alone(), self._sensing))
+
+    def torque(self, t: float, q: ArrayLike, v: ArrayLike) -> Array:
+        """Act as `Controller.torque`."""
+        self._move_goal(t)
+        return super().torque(t, q, v)
+
+    def velocity(self, t: float, q: ArrayLike, v: ArrayLike) -> Array:
+        """Act as `VelocityController.velocity`."""
+        self._move_goal(t)
+        return super().velocity(t, q, v)
+
+    def _move_goal(self, t: float) -> None:
+        """Put a goal that moves where it is at a time [s]."""
+        if not self._set_velocity.any():
+            return
+        if not t >= self._set_time:
+            self._set_time = t
+        since = min(t - self._set_time, _GOES_ON)
+        self._goal_velocity[:] = self._set_velocity if since < _GOES_ON else 0.0
+        self.goal = self._arm.integrate(self._set_goal, since * self._set_velocity)
+        self._guided.move_goal(self.goal)
 
     @property
     def remark(self) -> str:

@@ -192,6 +192,11 @@ class GuidedDensity:
         self._limits.set_sensing_distance(sub_goals.joint_sensing_distance)
         self._point_at_sub_goal()
 
+    def move_goal(self, q: Array) -> None:
+        """Put the goal at q (nq,), where it alone leads, its sensing regions as they are."""
+        self.sub_goals.q[:] = q
+        self.density.set_goal(q)
+
     def update(self, q: Array) -> None:
         """Move on to the farthest sub-goal in sight of q (nq,) and evaluate its density there.
 

@@ -8,8 +8,9 @@ import pinocchio as pin
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from numpy.typing import ArrayLike
 
-from densarm.arms.arm import Arm
+from densarm.arms.arm import Arm, load_arm
 from densarm.certificates.task import SimulationParameters
 from densarm.control.controller import Gains
 from densarm.control.inverse_dynamics import TRUSTED
@@ -22,6 +23,7 @@ from densarm.density.unsafe_sets import ImplicitSet
 from densarm.errors import InvalidValueError
 from densarm.planning.motion import Motion
 from densarm.scenarios.scenario import Scenario
+from densarm.scene.scene import Scene
 from densarm.simulation.plants import SingleIntegrator
 from densarm.simulation.simulate import simulate
 from densarm.values.arrays import Array
@@ -354,3 +356,52 @@ def test_a_field_of_ones_own_stops_before_what_it_does_not_see(
     assert all((metric is not None) == has_metric for metric in field.metrics)
     checks = {check.name: check.holds for check in run.certificate.checks}
     assert [name for name, holds in checks.items() if not holds] == ["goal"]
+
+
+class Following:
+    """A regulation whose goal moves at a constant velocity, and is set so often [s]."""
+
+    def __init__(self, world: World, start: Array, velocity: Array, every: float) -> None:
+        self.arm, self.start, self.moves, self.every = world.arm, start, velocity, every
+        self.regulation, self.next = DensityRegulation(world, start), 0.0
+
+    def goal(self, t: float) -> Array:
+        return self.arm.integrate(self.start, t * self.moves)
+
+    def torque(self, t: float, q: ArrayLike, v: ArrayLike) -> Array:
+        if t >= self.next:
+            self.regulation.set_goal(self.goal(t), self.moves)
+            self.next += self.every
+        return self.regulation.torque(t, q, v)
+
+
+@pytest.mark.parametrize("every", [0.001, 1.0 / 30.0])
+def test_a_goal_that_moves_is_followed_without_a_lag(every: float) -> None:
+    world = World(load_arm("ur5", shapes="capsule"), Scene())
+    arm, start = world.arm, world.arm.postures["ready"]
+    controller = Following(world, start, np.array([0.4, -0.1, 0.2, 0.0, 0.0, 0.3]), every)
+    limit = SimulationParameters(time_limit=1.2)
+    run = simulate(world, controller, start, controller.goal(9.0), parameters=limit)
+    goals = np.array([controller.goal(t) for t in run.time])
+    assert np.abs(arm.difference(run.q, goals))[800:].max() < 1e-5
+    held = np.array([arm.nonlinear_effects(q, np.zeros(6)) for q in run.q])
+    assert (np.abs(np.diff(run.tau - held, axis=0)) <= 1e-3 * arm.limits.torque_rate + 1e-6).all()
+    np.testing.assert_allclose(controller.regulation.goal, controller.goal(run.time[-2]), atol=1e-9)
+
+
+def test_a_goal_that_is_not_set_again_comes_to_rest(swing_up: Scenario) -> None:
+    arm, controller = swing_up.arm, regulation(swing_up)
+    controller.set_goal(arm.configuration([-0.4, 0.1]), [0.5, -0.2])
+    q = goes_to(controller, arm, swing_up.start)
+    np.testing.assert_allclose(arm.angles(controller.goal), [-0.35, 0.08], atol=1e-12)
+    np.testing.assert_allclose(arm.angles(q), [-0.35, 0.08], atol=1e-3)
+
+
+@pytest.mark.parametrize("velocity", [[0.1], [np.nan, 0.0], "fast"])
+def test_a_goal_of_a_wrong_velocity_is_refused_and_the_old_one_kept(
+    swing_up: Scenario, velocity: Any
+) -> None:
+    controller = regulation(swing_up)
+    with pytest.raises(InvalidValueError, match=r"^velocity = "):
+        controller.set_goal(swing_up.arm.configuration([-0.4, 0.1]), velocity)
+    np.testing.assert_array_equal(controller.goal, swing_up.arm.configuration(GOAL))
