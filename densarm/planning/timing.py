@@ -19,8 +19,8 @@ from densarm.world.stopping import StoppingCheck
 
 _DURATIONS = 0.25, 4.0  # [s]; TOPP-RA's tolerances are absolute, too small or large for others
 _MOST_PERIODS = 1_000_000  # of a motion, so that its arrays fit into memory
-_GRID_STEP = 0.0125  # [rad] between grid points at most
-_GRID = (200, 1000)
+_GRID_STEP = 0.025  # [rad] between grid points at most
+_GRID = (100, 1000)
 _SLOWDOWNS = 50  # tried in turn until the limits hold at every sample
 _LEAST_SLOWDOWN = 1.002
 _CHECKED = 4  # samples from one whose stopping is checked to the next

@@ -27,6 +27,7 @@ class NearPairs:
     def __init__(self, world: World) -> None:
         self._world = world
         self._smallest = np.inf
+        self._limit = np.empty(world.n_pairs)
         # Rows: after ways of s and w the distance is at least level - (lipschitz @ s + w); the
         # latter alone.
         self._numbers = np.full((2, world.n_pairs), -np.inf)
@@ -40,10 +41,10 @@ class NearPairs:
         )
         self._question = 0
 
-    def below(self, q: Array, limit: float) -> tuple[Pairs, Array]:
+    def below(self, q: Array, limit: float | Array) -> tuple[Pairs, Array]:
         """Return pairs (P,) and their distances (P,) [m] at q (nq,).
 
-        All that are nearer than the limit [m] are among them.
+        All that are nearer than the limit, or their own of (K,) limits [m], are among them.
         """
         self._question += 1
         pairs, rows, _ = self._ask(q, limit)
@@ -63,10 +64,11 @@ class NearPairs:
                 return nearest
             limit = nearest[0]
 
-    def _ask(self, q: Array, limit: float) -> tuple[Pairs, Array, tuple[float, int]]:
+    def _ask(self, q: Array, limit: float | Array) -> tuple[Pairs, Array, tuple[float, int]]:
         """Ask pairs that may be below a limit [m]; return them, all rows, and the nearest."""
         world, numbers = self._world, self._numbers
-        count = _may_be_below(q, limit, self._question, *self._arrays)
+        self._limit[:] = limit
+        count = _may_be_below(q, self._limit, self._question, *self._arrays)
         pairs = self._asked[1, :count]
         rows = world.query(q, pairs)
         return pairs, rows, _learn(rows, pairs, numbers)
@@ -79,7 +81,7 @@ def least_distances(world: World, q: Array, limit: float) -> Array:
     """
     near, least = NearPairs(world), np.full(world.n_pairs, np.inf)
     for row in q:
-        pairs, distance = near.below(row, limit)
+        pairs, distance = near.below(row, np.minimum(least, limit))
         least[pairs] = np.minimum(least[pairs], distance)
     return least
 
@@ -100,7 +102,7 @@ def smallest_distances(world: World, q: Array, time: Array | None = None) -> Arr
 @compiled
 def _may_be_below(
     q: Array,
-    limit: float,
+    limit: Array,
     question: int,
     q_last: Array,
     joint_index: NDArray[np.int64],
@@ -121,7 +123,7 @@ def _may_be_below(
             level[k] = -np.inf
         asked[2, k] = changes[k]
         gone[k] = pair_motion(lipschitz, k, joints[0]) + obstacle_way[k]
-        if asked[0, k] != question and level[k] - gone[k] - 2.0 * DISTANCE_TOLERANCE < limit:
+        if asked[0, k] != question and level[k] - gone[k] - 2.0 * DISTANCE_TOLERANCE < limit[k]:
             asked[0, k], asked[1, count] = question, k
             count += 1
     return count

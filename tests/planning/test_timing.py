@@ -164,7 +164,7 @@ def require_rates(arm: Arm, motion: Motion, parameters: TimingParameters) -> Non
 
 
 @pytest.mark.slow
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=8, deadline=None)
 @given(
     seed=st.integers(0, 10**6),
     spread=st.floats(0.05, 1.5),
