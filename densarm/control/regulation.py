@@ -1,7 +1,7 @@
 """Regulation: controllers that follow a planning system q̇ = k(q) to the goal, without a clock."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Protocol
 
 import numpy as np
@@ -10,7 +10,14 @@ from numpy.typing import ArrayLike
 from densarm.arms.arm import Arm
 from densarm.control.controller import Gains, checked_state
 from densarm.control.disturbance_observer import ActuationParameters
-from densarm.control.inverse_dynamics import InverseDynamics
+from densarm.control.evasion import EVADING_GAIN, Evasion
+from densarm.control.inverse_dynamics import (
+    ATTRACT,
+    BRAKE,
+    TORQUE,
+    InverseDynamics,
+    straight_torque,
+)
 from densarm.control.sensing import require_smooth_goal
 from densarm.control.speed_law import SpeedLaw, SpeedParameters
 from densarm.control.stopping import BackupFilter
@@ -22,7 +29,7 @@ from densarm.errors import InvalidValueError
 from densarm.planning.plan import inside_limits
 from densarm.values.arrays import Array
 from densarm.values.checks import finite_vector
-from densarm.world.active_pairs import DistanceBounds
+from densarm.world.active_pairs import ActivePairs, DistanceBounds
 from densarm.world.configurations import infeasibility
 from densarm.world.stopping import HELD_SHARE
 from densarm.world.swept_check import SweptCheck
@@ -74,8 +81,9 @@ class FieldRegulation:
         period: float = 0.001,
         inertia_at: Array | None = None,
         actuation: ActuationParameters = ActuationParameters(),
+        evasion: Evasion | None = None,
     ) -> None:
-        self._arm = arm
+        self._arm, self._evasion = arm, evasion
         self._field = field
         self._speed_law = speed_law
         self._gain = gains.velocity
@@ -102,7 +110,12 @@ class FieldRegulation:
         self._dynamics.update(t, q, v)
         v = self._dynamics.velocity
         metric = self._scale * self._dynamics.mass_matrix() if self._scale > 0.0 else None
-        wanted = self._dynamics.torque(-self._gain * v, self._gain * self._limited(q, metric))
+        velocity = self._limited(q, metric)
+        if self._evasion is not None and self._evasion.is_needed():
+            evading, gives_way = self._evasion.velocity(q, v, velocity)
+            if gives_way:
+                return self._evading_torque(v, evading)
+        wanted = self._dynamics.torque(-self._gain * v, self._gain * velocity)
         return self._filter.torque(t, self._dynamics, q, v, wanted, self._field.distances)
 
     @property
@@ -113,6 +126,13 @@ class FieldRegulation:
     def velocity(self, t: float, q: ArrayLike, v: ArrayLike) -> Array:
         """Return the planning system k(q) itself, as `VelocityController.velocity`."""
         return self._limited(checked_state(self._arm, q, v)[0], None)
+
+    def _evading_torque(self, v: Array, wanted: Array) -> Array:
+        """Send the torque that leads from v (nv,) to an evading velocity (nv,), as it must."""
+        rows, most = self._dynamics.rows, HELD_SHARE * self._arm.limits.acceleration
+        rows[BRAKE], rows[ATTRACT] = 0.0, np.clip(EVADING_GAIN * (wanted - v), -most, most)
+        straight_torque(*self._dynamics.terms, rows, self._dynamics.sent)
+        return np.array(rows[TORQUE])
 
     def _limited(self, q: Array, metric: Array | None) -> Array:
         velocity, way_left = self._field.velocity(q, metric)
@@ -140,7 +160,8 @@ class DensityRegulation(FieldRegulation):
     that metric too both lead straight from sub-goal to sub-goal, and differ where obstacles are
     sensed.
 
-    Obstacles may move meanwhile: they act where they are, and how fast they come is not looked at.
+    Where obstacles move the arm gives way to them, as `Evasion` says, k(q) being the velocity that
+    is wanted.
 
     Args:
         world: the arm among obstacles.
@@ -156,6 +177,7 @@ class DensityRegulation(FieldRegulation):
         sensing: sensing distances.
         speed: parameters of the speed law.
         actuation: how late torque is, and how far the model is trusted.
+        evasion: makes what gives way to obstacles that move, as the class `Evasion`.
 
     Attributes:
         goal: as given (nq,), or where it has moved to.
@@ -183,6 +205,7 @@ class DensityRegulation(FieldRegulation):
         sensing: SensingParameters = SensingParameters(),
         speed: SpeedParameters = SpeedParameters(),
         actuation: ActuationParameters = ActuationParameters(),
+        evasion: Callable[[World, ActivePairs, float], Evasion] = Evasion,
     ) -> None:
         require_smooth_goal(density, may_blend=True)
         arm = world.arm
@@ -199,7 +222,12 @@ class DensityRegulation(FieldRegulation):
         self._set_goal, self._set_velocity, self._set_time = self.goal, np.zeros(arm.nv), math.nan
         inertia_at = path.waypoints[-1] if plain else None
         law = SpeedLaw(world, margin, speed)
-        super().__init__(arm, self._density_field, law, gains, period, inertia_at, actuation)
+        gives_way = None
+        if not arm.links_without_mass:
+            gives_way = evasion(world, self._guided.pairs, margin)
+        super().__init__(
+            arm, self._density_field, law, gains, period, inertia_at, actuation, gives_way
+        )
 
     def set_goal(self, goal: ArrayLike, velocity: ArrayLike | None = None) -> None:
         r"""Lead to another goal from the next call on, without sub-goals.
@@ -274,7 +302,7 @@ class _DensityField:
 
     @property
     def distances(self) -> DistanceBounds:
-        return self._guided.distances
+        return self._guided.pairs
 
     def velocity(self, q: Array, metric: Array | None) -> tuple[Array, float]:
         """Act as `VelocityField.velocity`, and move on along the sub-goals."""

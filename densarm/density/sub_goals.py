@@ -12,7 +12,7 @@ from densarm.density.unsafe_sets import ClearanceSet, JointLimitSet, SensingPara
 from densarm.errors import InvalidValueError
 from densarm.values.arrays import Array
 from densarm.values.documented import documented
-from densarm.world.active_pairs import DistanceBounds, all_exceed
+from densarm.world.active_pairs import ActivePairs, DistanceBounds, all_exceed
 from densarm.world.swept_check import SweptCheck
 
 SPACING = 0.05
@@ -177,8 +177,8 @@ class GuidedDensity:
         self.is_critical()
 
     @property
-    def distances(self) -> DistanceBounds:
-        """Distances of all pairs at the last update."""
+    def pairs(self) -> ActivePairs:
+        """Distances of all pairs at the last update, of those near with their gradients."""
         return self._clearance_set.pairs
 
     def restart(self) -> None:
@@ -208,7 +208,7 @@ class GuidedDensity:
 
     def advance(self, q: Array) -> None:
         """Act as `update` where the density was evaluated last, at q (nq,)."""
-        if self.sub_goals.advance(q, self.distances):
+        if self.sub_goals.advance(q, self.pairs):
             self._point_at_sub_goal()
             self.density.update(q)
 
@@ -222,7 +222,7 @@ class GuidedDensity:
         """
         self.world.require_version(self._version)
         goals = self.sub_goals
-        if self.density.log_psi < 0.0 or not goals.is_in_sight(goals.current, q, self.distances):
+        if self.density.log_psi < 0.0 or not goals.is_in_sight(goals.current, q, self.pairs):
             return None
         return np.asarray(goals.q[goals.current])
 

@@ -6,8 +6,9 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from scipy.optimize import linprog
 
-from densarm.arms.arm import Arm
+from densarm.arms.arm import Arm, load_arm
 from densarm.control.evasion import EVADING_GAIN, Evasion, EvasionParameters
+from densarm.control.regulation import DensityRegulation
 from densarm.control.tracking import DensityTracking
 from densarm.density.inverse_bump import log_inverse_bump
 from densarm.errors import InvalidValueError
@@ -85,8 +86,6 @@ def test_rows_of_the_density_hold_unless_no_velocity_in_reach_keeps_them(
 @pytest.fixture(scope="module")
 def crossing_runs() -> dict[type[Evasion], Run]:
     """A ball of 1 m/s that would hit the moving Panda, with and without what evades it."""
-    from densarm.arms.arm import load_arm
-
     trial = draw_trial(load_arm("panda", shapes="capsule"), 1, 1.0, 1)
     start = trial.arm.configurations(trial.motion.position[0])
     runs = {}
@@ -112,6 +111,22 @@ def test_the_same_ball_hits_an_arm_that_does_not_see_it(
     crossing_runs: dict[type[Evasion], Run],
 ) -> None:
     assert crossing_runs[Blind].outcome == Outcome.COLLIDED
+
+
+@pytest.mark.slow
+def test_regulation_evades_a_ball_that_would_hit_it() -> None:
+    trial = draw_trial(load_arm("panda", shapes="capsule"), 1, 1.0, 2)
+    start, goal = trial.arm.configurations(trial.motion.position[[0, -1]])
+    runs = []
+    for evasion in (Blind, Evasion):
+        world = World(trial.arm, trial.scene)
+        controller = DensityRegulation(world, goal, evasion=evasion)
+        runs.append(simulate(world, controller, start))
+    blind, seeing = runs
+    assert blind.outcome == Outcome.COLLIDED
+    assert (seeing.outcome, seeing.detail) == (Outcome.REACHED, "")
+    assert seeing.clearance.min() > 0.0
+    assert (np.abs(seeing.tau) <= trial.arm.limits.effort).all()
 
 
 @pytest.mark.slow
