@@ -16,6 +16,7 @@ import numpy as np
 import pinocchio as pin
 
 from densarm.arms.arm import Arm, load_arm
+from densarm.control.evasion import Evasion
 from densarm.control.tracking import DensityTracking
 from densarm.errors import InvalidValueError
 from densarm.planning.motion import Motion
@@ -207,9 +208,17 @@ def full_sensing_controller(world: World, motion: Motion) -> DensityTracking:
     scene = world.scene
     for obstacle in scene:
         world.move_obstacle(obstacle.name, _FAR)
-    controller = DensityTracking(world, motion)
+    controller = DensityTracking(world, motion, evasion=_Standing)
     world.change_to(scene)
     return controller
+
+
+class _Standing(Evasion):
+    """Takes obstacles that were moved for ones that stand."""
+
+    def is_needed(self) -> bool:
+        """Return that none moves."""
+        return False
 
 
 def _percentiles(seconds: Array) -> list[float]:
