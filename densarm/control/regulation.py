@@ -219,7 +219,11 @@ class DensityRegulation(FieldRegulation):
         goals = SubGoals(self._check, path, sensing)
         self._guided = GuidedDensity(self._check, goals, goal_distance, density, tuple(unsafe_sets))
         self._density_field = _DensityField(self._guided, gains.rate)
-        self._set_goal, self._set_velocity, self._set_time = self.goal, np.zeros(arm.nv), math.nan
+        self._given_goal, self._given_velocity, self._given_time = (
+            self.goal,
+            np.zeros(arm.nv),
+            math.nan,
+        )
         inertia_at = path.waypoints[-1] if plain else None
         law = SpeedLaw(world, margin, speed)
         gives_way = None
@@ -247,8 +251,8 @@ class DensityRegulation(FieldRegulation):
         checked, moves = self._checked(goal), np.zeros(self._arm.nv)
         if velocity is not None:
             moves = finite_vector("velocity", velocity, self._arm.nv)
-        self.goal = self._set_goal = checked
-        self._set_velocity, self._set_time = moves, math.nan
+        self.goal = self._given_goal = checked
+        self._given_velocity, self._given_time = moves, math.nan
         self._goal_velocity[:] = 0.0
         self._guided.lead_along(SubGoals(self._check, self._to_goal_alone(), self._sensing))
 
@@ -264,13 +268,13 @@ class DensityRegulation(FieldRegulation):
 
     def _move_goal(self, t: float) -> None:
         """Put a goal that moves where it is at a time [s]."""
-        if not self._set_velocity.any():
+        if not self._given_velocity.any():
             return
-        if not t >= self._set_time:
-            self._set_time = t
-        since = min(t - self._set_time, _GOES_ON)
-        self._goal_velocity[:] = self._set_velocity if since < _GOES_ON else 0.0
-        self.goal = self._arm.integrate(self._set_goal, since * self._set_velocity)
+        if not t >= self._given_time:
+            self._given_time = t
+        since = min(t - self._given_time, _GOES_ON)
+        self._goal_velocity[:] = self._given_velocity if since < _GOES_ON else 0.0
+        self.goal = self._arm.integrate(self._given_goal, since * self._given_velocity)
         self._guided.move_goal(self.goal)
 
     @property
