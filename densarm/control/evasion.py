@@ -8,6 +8,8 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
+from densarm.control.disturbance_observer import AHEAD_VELOCITY
+from densarm.control.inverse_dynamics import ATTRACT, BRAKE, InverseDynamics, straight_torque
 from densarm.density.inverse_bump import log_inverse_bump
 from densarm.values.arrays import Array
 from densarm.values.checks import non_negative, positive
@@ -16,6 +18,7 @@ from densarm.values.kernels import compiled, compiled_part
 from densarm.world.active_pairs import ActivePairs, pair_motion
 from densarm.world.distance_view import add_pair_gradient, pair_rate
 from densarm.world.pair_queries import PairQueries
+from densarm.world.stopping import HELD_SHARE
 from densarm.world.world import World
 
 EVADING_GAIN = 40.0
@@ -165,6 +168,19 @@ class Evasion:
             rho_soft=_SOFTNESS,
         )
         return (np.clip(found, low, high) if flag > 0 else np.clip(0.0, low, high)), True
+
+    def send_torque(
+        self, dynamics: InverseDynamics, wanted: Array, ahead: Array | float = 0.0
+    ) -> None:
+        """Send the torque that leads to a velocity (nv,), by K_v and an acceleration (nv,) ahead.
+
+        Accelerations are kept within their limits, before the torque rate of the dynamics.
+        """
+        rows = dynamics.rows
+        acceleration = EVADING_GAIN * (wanted - rows[AHEAD_VELOCITY]) + ahead
+        most = HELD_SHARE * self._arm.limits.acceleration
+        rows[ATTRACT], rows[BRAKE] = np.clip(acceleration, -most, most), 0.0
+        straight_torque(*dynamics.terms, rows, dynamics.sent)
 
     def _write_rows(self, q: Array, v: Array, angles: Array) -> None:
         """Write ∇h · q̇ ≥ b of all rows, [∇h, b] (nv + 1,), in blocks of the number of pairs."""

@@ -10,14 +10,8 @@ from numpy.typing import ArrayLike
 from densarm.arms.arm import Arm
 from densarm.control.controller import Gains, checked_state
 from densarm.control.disturbance_observer import ActuationParameters
-from densarm.control.evasion import EVADING_GAIN, Evasion
-from densarm.control.inverse_dynamics import (
-    ATTRACT,
-    BRAKE,
-    TORQUE,
-    InverseDynamics,
-    straight_torque,
-)
+from densarm.control.evasion import Evasion
+from densarm.control.inverse_dynamics import TORQUE, InverseDynamics
 from densarm.control.sensing import require_smooth_goal
 from densarm.control.speed_law import SpeedLaw, SpeedParameters
 from densarm.control.stopping import BackupFilter
@@ -87,7 +81,7 @@ class FieldRegulation:
         self._field = field
         self._speed_law = speed_law
         self._gain = gains.velocity
-        self._goal_velocity = np.zeros(arm.nv)  # which a field that knows of one writes
+        self._goal_velocity = np.zeros(arm.nv)  # zero unless a subclass knows of one
         self._scale = 0.0
         if inertia_at is not None:
             self._scale = 1.0 / float(arm.mass_matrix(inertia_at).diagonal().max())
@@ -114,7 +108,8 @@ class FieldRegulation:
         if self._evasion is not None and self._evasion.is_needed():
             evading, gives_way = self._evasion.velocity(q, v, velocity)
             if gives_way:
-                return self._evading_torque(v, evading)
+                self._evasion.send_torque(self._dynamics, evading)
+                return np.array(self._dynamics.rows[TORQUE])
         wanted = self._dynamics.torque(-self._gain * v, self._gain * velocity)
         return self._filter.torque(t, self._dynamics, q, v, wanted, self._field.distances)
 
@@ -126,13 +121,6 @@ class FieldRegulation:
     def velocity(self, t: float, q: ArrayLike, v: ArrayLike) -> Array:
         """Return the planning system k(q) itself, as `VelocityController.velocity`."""
         return self._limited(checked_state(self._arm, q, v)[0], None)
-
-    def _evading_torque(self, v: Array, wanted: Array) -> Array:
-        """Send the torque that leads from v (nv,) to an evading velocity (nv,), as it must."""
-        rows, most = self._dynamics.rows, HELD_SHARE * self._arm.limits.acceleration
-        rows[BRAKE], rows[ATTRACT] = 0.0, np.clip(EVADING_GAIN * (wanted - v), -most, most)
-        straight_torque(*self._dynamics.terms, rows, self._dynamics.sent)
-        return np.array(rows[TORQUE])
 
     def _limited(self, q: Array, metric: Array | None) -> Array:
         velocity, way_left = self._field.velocity(q, metric)

@@ -14,7 +14,7 @@ from densarm.control.disturbance_observer import (
     DISTURBANCE,
     ActuationParameters,
 )
-from densarm.control.evasion import EVADING_GAIN, Evasion
+from densarm.control.evasion import Evasion
 from densarm.control.inverse_dynamics import (
     ATTRACT,
     BRAKE,
@@ -25,7 +25,6 @@ from densarm.control.inverse_dynamics import (
     InverseDynamics,
     robust_torque,
     send,
-    straight_torque,
 )
 from densarm.control.sensing import require_smooth_goal, sensed_off
 from densarm.density.goal_distance import GoalDistance, TorusDistance, torus_distance
@@ -214,12 +213,8 @@ class DensityTracking:
         if self._is_evading:
             numbers[_EMERGENCY] = 0.0
             rows[RATE_LIMIT] = numbers[_ELAPSED] * self._arm.limits.torque_rate
-            most = HELD_SHARE * self._arm.limits.acceleration
             ahead = 0.0 if gives_way else rows[BRAKE]
-            rows[ATTRACT] = np.clip(EVADING_GAIN * (wanted - v) + ahead, -most, most)
-            rows[BRAKE] = 0.0
-            dynamics = self._dynamics
-            straight_torque(*dynamics.terms, dynamics.rows, dynamics.sent)
+            self._evasion.send_torque(self._dynamics, wanted, ahead)
 
     def pause(self) -> None:
         """Let the reference's clock come to rest, so that the arm rests on the motion."""
