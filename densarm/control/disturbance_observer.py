@@ -10,7 +10,7 @@ from densarm.arms.arm import Arm
 from densarm.values.arrays import Array
 from densarm.values.checks import non_negative
 from densarm.values.documented import documented
-from densarm.values.kernels import compiled, compiled_part
+from densarm.values.kernels import compiled_part
 
 # Rows of the observer's table: the estimate now, and when a torque sent now acts.
 ANGLE, VELOCITY, DISTURBANCE, AHEAD_ANGLE, AHEAD_VELOCITY = 0, 1, 2, 3, 4
@@ -19,6 +19,8 @@ _NONLINEAR, _GRAVITY, _INNOVATION, _ACCELERATION, _LARGEST, _JITTER = 6, 7, 8, 9
 FREE_INERTIA = 12  # 1 / (M⁻¹)_ii, what a joint moves where the others give way
 _MEASURED_ANGLE, _MEASURED_VELOCITY = 13, 14
 N_ROWS = 15
+
+ELAPSED, _BANDWIDTH, _DELAY, _TIME, _PERIOD = 0, 1, 2, 3, 4  # its numbers
 
 _JITTER_SHARE = 0.0012  # of the torque limits, by which noise may move a disturbance in a period
 _TRUSTED_SHARE = 0.9  # of the torque limits, that a disturbance may be taken to have
@@ -72,8 +74,10 @@ class DisturbanceObserver:
         parameters: the delay and L.
 
     Attributes:
-        rows: table of the estimates (N, nv), of which the first `N_ROWS` are the observer's.
+        rows: table of the estimates (N, nv), of which the first `N_ROWS` and the last nv are the
+            observer's.
         sent: torques that were sent, the last row for the one to come (N, nv) [N·m or N].
+        numbers: what `observe` keeps.
 
     Source: J. Han, From PID to active disturbance rejection control, IEEE TIE 2009, section IV, in
         discrete time as by G. Franklin et al., Digital Control of Dynamic Systems, ch. 8.
@@ -90,54 +94,21 @@ class DisturbanceObserver:
             noise = np.float64(parameters.velocity_noise)
             self.rows[_JITTER] = _JITTER_SHARE * arm.limits.effort / noise
         self.sent: Array = np.zeros((late + 2, arm.nv))
-        self._joint_index: NDArray[np.int64] = arm.joint_index
-        self._factor = np.zeros((arm.nv, arm.nv))
-        self._numbers = np.array([0.0, parameters.bandwidth, parameters.delay])
-        self._time = math.nan
+        self.numbers: Array = np.array(
+            [period, parameters.bandwidth, parameters.delay, math.nan, period]
+        )
 
     def begins(self, t: float) -> bool:
         """Return whether it begins anew at a time [s]."""
-        return not 0.0 <= t - self._time <= _LONGEST_STEP
-
-    def update(
-        self, t: float, q: Array, v: Array, mass: Array, nonlinear: Array, gravity: Array
-    ) -> float:
-        """Take a measured state in, and return the time since the last one [s].
-
-        It is zero where the observer begins: no disturbance is known then, and the arm is held.
-
-        Args:
-            t: when [s]; NaN to begin anew.
-            q: configuration (nq,).
-            v: velocity (nv,).
-            mass: M there, upper triangle (nv, nv).
-            nonlinear: H there (nv,) [N·m or N].
-            gravity: gravity there (nv,) [N·m or N].
-        """
-        elapsed = -1.0 if self.begins(t) else t - self._time
-        self._time = t
-        self._numbers[0] = elapsed
-        _observe(
-            q,
-            v,
-            self._numbers,
-            self._joint_index,
-            mass,
-            nonlinear,
-            gravity,
-            self.rows,
-            self.sent,
-            self._factor,
-        )
-        return max(elapsed, 0.0)
+        return not 0.0 <= t - self.numbers[_TIME] <= _LONGEST_STEP
 
     def set_bandwidth(self, bandwidth: float) -> None:
         """Use another L [1/s]."""
-        self._numbers[1] = bandwidth
+        self.numbers[_BANDWIDTH] = bandwidth
 
     def take_over(self, other: "DisturbanceObserver", t: float) -> None:
         """Go on from another's estimates and torques, of the same arm, as if known at t [s]."""
-        self._time = t
+        self.numbers[_TIME] = t
         self.rows[:_LARGEST] = other.rows[:_LARGEST]
         n = min(len(self.sent), len(other.sent))
         self.sent[-n:] = other.sent[-n:]
@@ -148,50 +119,71 @@ class DisturbanceObserver:
         self.rows[VELOCITY] = self.rows[AHEAD_VELOCITY] = v
 
 
-@compiled
-def _observe(  # noqa: C901  # one kernel, since every call has its cost
+@compiled_part
+def observe(  # noqa: C901  # one kernel, since every call has its cost
+    t: float,
     q: Array,
     v: Array,
-    numbers: Array,
     joint_index: NDArray[np.int64],
-    mass: Array,
-    nonlinear: Array,
-    gravity: Array,
+    terms: tuple[Array, Array, Array],
     rows: Array,
     sent: Array,
-    factor: Array,
-) -> None:
-    dt, delay, size, nv = numbers[0], numbers[2], sent.shape[0], v.size
+    numbers: Array,
+) -> bool:
+    """Take a measured state in; return whether the observer begins anew.
+
+    No disturbance is known then, and the arm is held.
+
+    Args:
+        t: when [s]; NaN to begin anew.
+        q: configuration (nq,).
+        v: velocity (nv,).
+        joint_index: `Arm.joint_index` (2, nv).
+        terms: M there, upper triangle (nv, nv), H (nv,) and gravity (nv,) [N·m or N].
+        rows: of the observer, as are all that follow; the last nv are a workspace.
+        sent: as `DisturbanceObserver.sent`.
+        numbers: with the time since the last state, a period where that is not known, which is
+            written [s].
+    """
+    mass, nonlinear, gravity = terms
+    factor = rows[rows.shape[0] - v.size :]
+    dt, delay, size, nv = t - numbers[_TIME], numbers[_DELAY], sent.shape[0], v.size
+    begins = not (dt >= 0.0 and dt <= _LONGEST_STEP)
+    numbers[_TIME] = t
+    if begins:
+        numbers[ELAPSED] = numbers[_PERIOD]
+    elif dt > 0.0:
+        numbers[ELAPSED] = dt
     angle, velocity, disturbance = rows[ANGLE], rows[VELOCITY], rows[DISTURBANCE]
     acceleration, innovation = rows[_ACCELERATION], rows[_INNOVATION]
     _factorise(mass, factor)
     _write_free_inertia(factor, acceleration, rows[FREE_INERTIA])
-    is_new = dt != 0.0
+    is_new = begins or dt != 0.0
     for i in range(nv):
         position = _position(q, joint_index, i)
         is_new |= position != rows[_MEASURED_ANGLE, i] or v[i] != rows[_MEASURED_VELOCITY, i]
         rows[_MEASURED_ANGLE, i], rows[_MEASURED_VELOCITY, i] = position, v[i]
     if not is_new:
-        return
-    if dt <= 0.0:
+        return begins
+    if begins or dt == 0.0:
         for i in range(nv):
             angle[i], velocity[i] = rows[_MEASURED_ANGLE, i], v[i]
             rows[AHEAD_ANGLE, i], rows[AHEAD_VELOCITY, i] = angle[i], velocity[i]
-            if dt < 0.0:
+            if begins:
                 rows[_NONLINEAR, i], disturbance[i] = nonlinear[i], 0.0
                 for k in range(size):
                     sent[k, i] = gravity[i]
                 rows[_GRAVITY, i], rows[FREE, i] = gravity[i], 0.0
-        return
+        return begins
     acting = size - 1 - min(int(delay / dt + 0.5), size - 1)
-    pole = math.exp(-min(numbers[1], 1.0 / (dt + delay)) * dt)
+    pole = math.exp(-min(numbers[_BANDWIDTH], 1.0 / (dt + delay)) * dt)
     for i in range(nv):
         acceleration[i] = sent[acting, i] + disturbance[i] - rows[_NONLINEAR, i]
     _solve(factor, acceleration)
     for i in range(nv):
         predicted = velocity[i] + dt * acceleration[i]
         learn = min(1.0 - pole, math.sqrt(rows[_JITTER, i] * dt / mass[i, i]))
-        keep = 1.0 if numbers[1] == 0.0 else learn * (2.0 - learn)
+        keep = 1.0 if numbers[_BANDWIDTH] == 0.0 else learn * (2.0 - learn)
         velocity[i] = predicted + keep * (v[i] - predicted)
         innovation[i] = learn * learn / dt * (v[i] - predicted)
         angle[i] += dt * predicted
@@ -218,6 +210,7 @@ def _observe(  # noqa: C901  # one kernel, since every call has its cost
     for k in range(size - 1):
         for i in range(nv):
             sent[k, i] = sent[k + 1, i]
+    return begins
 
 
 @compiled_part

@@ -180,7 +180,7 @@ class Evasion:
         acceleration = EVADING_GAIN * (wanted - rows[AHEAD_VELOCITY]) + ahead
         most = HELD_SHARE * self._arm.limits.acceleration
         rows[ATTRACT], rows[BRAKE] = np.clip(acceleration, -most, most), 0.0
-        straight_torque(*dynamics.terms, rows, dynamics.sent)
+        straight_torque(dynamics.arrays)
 
     def _write_rows(self, q: Array, v: Array, angles: Array) -> None:
         """Write ∇h · q̇ ≥ b of all rows, [∇h, b] (nv + 1,), in blocks of the number of pairs."""

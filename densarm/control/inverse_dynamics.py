@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pinocchio as pin
+from numpy.typing import NDArray
 
 from densarm.arms.arm import Arm
 from densarm.arms.dynamics import Kinematics
@@ -11,11 +12,13 @@ from densarm.control.disturbance_observer import (
     AHEAD_ANGLE,
     AHEAD_VELOCITY,
     DISTURBANCE,
+    ELAPSED,
     FREE,
     FREE_INERTIA,
     N_ROWS,
     ActuationParameters,
     DisturbanceObserver,
+    observe,
 )
 from densarm.values.arrays import Array
 from densarm.values.kernels import compiled, compiled_part
@@ -25,6 +28,11 @@ from densarm.values.kernels import compiled, compiled_part
 BRAKE, ATTRACT, _BRAKE_TORQUE, _ATTRACT_TORQUE, _OFFSET = (N_ROWS + k for k in range(5))
 _ACCELERATION_LIMIT, EFFORT_LIMIT, RATE_LIMIT = N_ROWS + 5, N_ROWS + 6, N_ROWS + 7
 VELOCITY_LIMIT, INERTIA_FLOOR, _ZERO, TORQUE = N_ROWS + 8, N_ROWS + 9, N_ROWS + 10, N_ROWS + 11
+TORQUE_RATE = N_ROWS + 12
+
+DynamicsArrays = tuple[Array, Array, Array, Array, Array, Array, NDArray[np.int64]]
+"""M (upper triangle), H, gravity, rows, sent torques, numbers, and joint index: what kernels of
+inverse dynamics share."""
 
 _FASTEST = 1e3  # [rad/s or m/s], where joints have no limit
 _LARGEST_LAG = 0.6  # of K_v (M + D) / M times the lag
@@ -54,7 +62,7 @@ class InverseDynamics:
         actuation: delay and observer.
 
     Attributes:
-        terms: M (upper triangle), H and gravity of the last update.
+        arrays: M, H and gravity of the last update, and all that kernels write.
         rows: table of the kernels (N, nv).
         sent: torques of the last periods, the last one last (N, nv) [N·m or N].
 
@@ -74,20 +82,20 @@ class InverseDynamics:
     ) -> None:
         arm.require_masses("torque")
         self._arm = arm
-        self._period = self._elapsed = period
+        self._period = period
         self._updates_kinematics = kinematics is None
         self._kinematics = kinematics or Kinematics(arm)
-        data = self._kinematics.data
-        self.terms: tuple[Array, Array, Array] = (self._kinematics.mass_matrix, data.nle, data.g)
-        self.rows: Array = np.zeros((N_ROWS + 12, arm.nv))
+        self.rows: Array = np.zeros((N_ROWS + 13 + arm.nv, arm.nv))
         self.rows[_ACCELERATION_LIMIT] = acceleration_limit
         self.rows[EFFORT_LIMIT] = arm.limits.effort
         self.rows[VELOCITY_LIMIT] = np.minimum(arm.limits.velocity, _FASTEST)
         self.rows[INERTIA_FLOOR] = actuation.inertia_floor
-        self.rows[RATE_LIMIT] = math.inf
-        self._limits_rate = bool(np.isfinite(arm.limits.torque_rate).any())
-        self._observer = DisturbanceObserver(arm, period, actuation, self.rows)
-        self.sent: Array = self._observer.sent
+        self.rows[TORQUE_RATE], self.rows[RATE_LIMIT] = arm.limits.torque_rate, math.inf
+        self._observer = observer = DisturbanceObserver(arm, period, actuation, self.rows)
+        self.sent: Array = observer.sent
+        mass, data = self._kinematics.mass_matrix, self._kinematics.data
+        own = self.rows, self.sent, observer.numbers
+        self.arrays: DynamicsArrays = (mass, data.nle, data.g, *own, arm.joint_index)
 
     def load(self) -> None:
         """Load, or compile, the kernels before a control loop."""
@@ -103,19 +111,22 @@ class InverseDynamics:
         NaN for the time begins anew, and leaves rates unlimited. The time since the last update is
         returned [s], a period where that is not known.
         """
-        kinematics = self._kinematics
         if self._updates_kinematics:
-            kinematics.update(q)
-        pin.nonLinearEffects(kinematics.model, kinematics.data, q, v)
-        if begins := self._observer.begins(t):
-            self._elapsed = self._period
-        if self._limits_rate or begins:
-            pin.computeGeneralizedGravity(kinematics.model, kinematics.data, q)
-        self._elapsed = elapsed = self._observer.update(t, q, v, *self.terms) or self._elapsed
-        if self._limits_rate:
-            rate = self._arm.limits.torque_rate
-            self.rows[RATE_LIMIT] = math.inf if math.isnan(t) else elapsed * rate
-        return elapsed
+            self._kinematics.update(q)
+        self.compute_terms(q, v)
+        _take_in(float(t), q, v, self.arrays)  # another number would have it compiled again
+        return self.elapsed
+
+    def compute_terms(self, q: Array, v: Array) -> None:
+        """Compute H and gravity alone, for a kernel that goes on by `take_in`."""
+        model, data = self._kinematics.model, self._kinematics.data
+        pin.nonLinearEffects(model, data, q, v)
+        pin.computeGeneralizedGravity(model, data, q)
+
+    @property
+    def elapsed(self) -> float:
+        """The time between the last two updates, or a period [s]."""
+        return float(self._observer.numbers[ELAPSED])
 
     def begins(self, t: float) -> bool:
         """Return whether an update at a time [s] knows of none before."""
@@ -166,7 +177,7 @@ class InverseDynamics:
     def torque(self, brake: Array, attract: Array) -> Array:
         """Return torque (nv,) for accelerations (nv,) [rad/s²] at the updated state."""
         self.rows[BRAKE], self.rows[ATTRACT] = brake, attract
-        _limited_torque(self.terms[0], self.terms[1], self.rows)
+        _limited_torque(self.arrays)
         return np.array(self.rows[TORQUE])
 
     def send(self, tau: Array, *, is_emergency: bool = False) -> Array:
@@ -177,12 +188,31 @@ class InverseDynamics:
         self.rows[TORQUE] = tau
         if is_emergency:
             self.rows[RATE_LIMIT] = math.inf
-        _send(self.terms[2], self.rows, self.sent)
+        _send(self.arrays)
         return np.array(self.rows[TORQUE])
 
 
 @compiled
-def _limited_torque(mass: Array, nonlinear: Array, rows: Array) -> None:
+def _take_in(t: float, q: Array, v: Array, arrays: DynamicsArrays) -> None:
+    take_in(t, q, v, arrays)
+
+
+@compiled_part
+def take_in(t: float, q: Array, v: Array, arrays: DynamicsArrays) -> bool:
+    """Act as `InverseDynamics.update`, terms being known; return whether all begins anew."""
+    mass, nonlinear, gravity, rows, sent, numbers, joint_index = arrays
+    terms = mass, nonlinear, gravity
+    begins = observe(t, q, v, joint_index, terms, rows, sent, numbers)
+    for i in range(v.size):
+        rows[RATE_LIMIT, i] = numbers[ELAPSED] * rows[TORQUE_RATE, i]
+        if math.isnan(t):
+            rows[RATE_LIMIT, i] = math.inf
+    return begins
+
+
+@compiled
+def _limited_torque(arrays: DynamicsArrays) -> None:
+    mass, nonlinear, rows = arrays[0], arrays[1], arrays[3]
     gamma, beta = _shares(rows[_ZERO], rows[BRAKE], rows[ATTRACT], rows[_ACCELERATION_LIMIT])
     offset = rows[_OFFSET]
     for i in range(nonlinear.shape[0]):
@@ -201,17 +231,18 @@ def _limited_torque(mass: Array, nonlinear: Array, rows: Array) -> None:
 
 
 @compiled
-def _send(gravity: Array, rows: Array, sent: Array) -> None:
-    send(gravity, rows, sent)
+def _send(arrays: DynamicsArrays) -> None:
+    send(arrays)
 
 
 @compiled_part
-def send(gravity: Array, rows: Array, sent: Array) -> None:
+def send(arrays: DynamicsArrays) -> None:
     """Limit the change of `TORQUE` beside gravity (nv,) to `RATE_LIMIT`, and keep it as sent.
 
     Where the rate binds, the change keeps its direction: an arm in which each joint changes by as
     much as it may would accelerate elsewhere than it is told.
     """
+    gravity, rows, sent = arrays[2], arrays[3], arrays[4]
     share = 1.0
     for i in range(gravity.shape[0]):
         change = abs(rows[TORQUE, i] - rows[FREE, i] - gravity[i])
@@ -227,9 +258,7 @@ def send(gravity: Array, rows: Array, sent: Array) -> None:
 
 
 @compiled_part
-def robust_torque(
-    mass: Array, nonlinear: Array, gain: float, elapsed: float, late: float, rows: Array
-) -> None:
+def robust_torque(gain: float, elapsed: float, late: float, arrays: DynamicsArrays) -> None:
     r"""Write the torque of a reference's acceleration and of a feedback that no cap weakens.
 
     .. math::
@@ -243,14 +272,13 @@ def robust_torque(
     diagonal, M⁻¹ being large where M is nearly singular.
 
     Args:
-        mass: M, upper triangle (nv, nv).
-        nonlinear: H (nv,).
         gain: K_v [1/s].
         elapsed: period of `RATE_LIMIT` [s].
         late: time from a state to the end of the torque that answers it [s].
-        rows: `BRAKE`, the reference's acceleration, and `ATTRACT`, the feedback; `TORQUE` is
-            written.
+        arrays: of their rows `BRAKE`, the reference's acceleration, and `ATTRACT`, the feedback,
+            are read; `TORQUE` is written.
     """
+    mass, nonlinear, rows = arrays[0], arrays[1], arrays[3]
     n = nonlinear.shape[0]
     feedback, bound = rows[_ATTRACT_TORQUE], _LARGEST_LAG / (gain * late) - 1.0
     for i in range(n):
@@ -269,18 +297,9 @@ def robust_torque(
 
 
 @compiled
-def straight_torque(
-    mass: Array, nonlinear: Array, gravity: Array, rows: Array, sent: Array
-) -> None:
-    """Write and send the torque of two accelerations.
-
-    Args:
-        mass: M, upper triangle (nv, nv).
-        nonlinear: H (nv,).
-        gravity: of it (nv,).
-        rows: `BRAKE` and `ATTRACT`; `TORQUE` is written.
-        sent: as `InverseDynamics.sent`.
-    """
+def straight_torque(arrays: DynamicsArrays) -> None:
+    """Write and send the torque of two accelerations, the rows `BRAKE` and `ATTRACT`."""
+    mass, nonlinear, rows = arrays[0], arrays[1], arrays[3]
     n = nonlinear.shape[0]
     for i in range(n):
         tau = nonlinear[i] - rows[DISTURBANCE, i]
@@ -288,7 +307,7 @@ def straight_torque(
             entry = mass[i, j] if i <= j else mass[j, i]
             tau += entry * (rows[BRAKE, j] + rows[ATTRACT, j])
         rows[TORQUE, i] = _clipped(tau, rows[EFFORT_LIMIT, i])
-    send(gravity, rows, sent)
+    send(arrays)
 
 
 @compiled_part

@@ -4,7 +4,7 @@ import math
 from collections.abc import Callable, Sequence
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from densarm.arms.dynamics import Kinematics
 from densarm.control.controller import Gains, checked_state
@@ -12,6 +12,7 @@ from densarm.control.disturbance_observer import (
     AHEAD_ANGLE,
     AHEAD_VELOCITY,
     DISTURBANCE,
+    ELAPSED,
     ActuationParameters,
 )
 from densarm.control.evasion import Evasion
@@ -21,10 +22,13 @@ from densarm.control.inverse_dynamics import (
     EFFORT_LIMIT,
     RATE_LIMIT,
     TORQUE,
+    TORQUE_RATE,
     VELOCITY_LIMIT,
+    DynamicsArrays,
     InverseDynamics,
     robust_torque,
     send,
+    take_in,
 )
 from densarm.control.sensing import require_smooth_goal, sensed_off
 from densarm.density.goal_distance import GoalDistance, TorusDistance, torus_distance
@@ -39,7 +43,7 @@ from densarm.density.unsafe_sets import (
 )
 from densarm.planning.motion import Motion, MotionSample, write_sample
 from densarm.values.arrays import Array
-from densarm.values.kernels import compiled
+from densarm.values.kernels import compiled, compiled_part
 from densarm.world.active_pairs import ActivePairs
 from densarm.world.stopping import HELD_SHARE
 from densarm.world.world import World
@@ -133,10 +137,9 @@ class DensityTracking:
         distance = goal_distance or TorusDistance(arm)
         pairs, joints = sensed_off(world, motion, sensing, self._kinematics)
         unsafe: list[UnsafeSet] = [pairs, joints, *unsafe_sets]
-        self._goes_on_from: float | None = None
         self._density = NavigationDensity(arm, self.goal, unsafe, distance, density)
         self._gains = gains
-        self._numbers = np.zeros(_N_NUMBERS)
+        self._numbers = np.full(_N_NUMBERS + _EMERGENCY, math.nan)
         if arm.links_without_mass:
             self.velocity(0.0, self.goal, np.zeros(arm.nv))
             return
@@ -144,10 +147,11 @@ class DensityTracking:
         self._evasion, self._is_evading = evasion(world, pairs.pairs, motion.margin), False
         self._dynamics = InverseDynamics(arm, unlimited, self._kinematics, motion.period, actuation)
         kappa = distance.kappa if isinstance(distance, TorusDistance) else math.nan
+        self._has_own_distance = math.isnan(kappa)
         constants = motion.period, actuation.delay, kappa, gains.position, gains.velocity
-        self._numbers[_PERIOD:] = *constants, 1.0
-        self._time, self._clock = math.nan, self._numbers[_CLOCK].copy()
+        self._numbers[_PERIOD:_N_NUMBERS] = *constants, 1.0
         self._sample = np.zeros((6, arm.nv))
+        self._arrays = self._numbers, self._sample, motion.knots, self._dynamics.arrays
         self._sample[_WEIGHTS] = getattr(distance, "weights", 1.0)
         self._sample[_MOST] = _PAUSE_SHARE * arm.limits.acceleration
         for t in (0.0, motion.period, math.nan):  # kernels are loaded before a control loop
@@ -163,37 +167,23 @@ class DensityTracking:
         self._arm.require_masses("torque")
         q, v = checked_state(self._arm, q, v)
         self._kinematics.update(q)
-        numbers, dynamics = self._numbers, self._dynamics
-        begins, elapsed = dynamics.begins(t), dynamics.update(t, q, v)
-        if self._goes_on_from is not None:
-            numbers[_CLOCK] = t - self._goes_on_from, 0.0, 0.0, 0.0
-            self._goes_on_from = None
-        elif begins or math.isnan(numbers[_TIME]):
-            numbers[_CLOCK] = 0.0, 1.0, 0.0, 0.0
-        elif t == self._time:  # asked again, which moves no clock
-            numbers[_CLOCK] = self._clock
-        else:
-            numbers[_LAG] += (1.0 - numbers[_RATE]) * elapsed
-        self._time, self._clock = t, numbers[_CLOCK].copy()
-        numbers[_TIME], numbers[_ELAPSED] = t - numbers[_LAG], elapsed
-        if math.isnan(numbers[_KAPPA]):
-            dynamics.rows[ATTRACT] = self._attraction(q, self._ahead().position)
-        else:
-            self._density.update_psi(q)
-        numbers[_LOG_PSI] = self._density.log_psi
-        self.tracking_error = _tracking_torque(
-            numbers,
-            dynamics.rows,
-            self._sample,
-            self.motion.knots,
-            self._arm.joint_index,
-            self._density.log_psi_gradient,
-            *dynamics.terms,
-            dynamics.sent,
-        )
+        self._dynamics.compute_terms(q, v)
+        self._density.update_psi(q)
+        self._act(float(t), q, v)
+        if self._has_own_distance:  # asked again for the time of the reference that is known now
+            self._dynamics.rows[ATTRACT] = self._attraction(q, self._ahead().position)
+            self._act(float(t), q, v)
         if self._evasion.is_needed():
             self._evade(q)
-        return np.array(dynamics.rows[TORQUE])
+        tau: Array = self._dynamics.rows[TORQUE].copy()
+        return tau
+
+    def _act(self, t: float, q: Array, v: Array) -> None:
+        """Send the torque at a state, of which all terms and Ψ are known."""
+        density = self._density
+        self.tracking_error = _tracking_torque(
+            t, q, v, density.log_psi, density.log_psi_gradient, *self._arrays
+        )
 
     def _evade(self, q: Array) -> None:
         """Replace the torque by one that gives way, and that returns to the reference.
@@ -212,7 +202,7 @@ class DensityTracking:
         self._is_evading = gives_way or (self._is_evading and bool(is_off))
         if self._is_evading:
             numbers[_EMERGENCY] = 0.0
-            rows[RATE_LIMIT] = numbers[_ELAPSED] * self._arm.limits.torque_rate
+            rows[RATE_LIMIT] = self._dynamics.elapsed * rows[TORQUE_RATE]
             ahead = 0.0 if gives_way else rows[BRAKE]
             self._evasion.send_torque(self._dynamics, wanted, ahead)
 
@@ -237,7 +227,7 @@ class DensityTracking:
             nearest = int(off.max(axis=1).argmin())
             if not off[nearest].max() <= 1.0:
                 return False
-            self._goes_on_from = nearest * self.motion.period
+            self._numbers[_GOES_ON_FROM] = nearest * self.motion.period
         self._numbers[_WANTED_RATE] = 1.0
         return True
 
@@ -304,11 +294,12 @@ class DensityTracking:
 
 _POSITION, _VELOCITY, _ACCELERATION, _ERROR, _WEIGHTS, _MOST = 0, 1, 2, 3, 4, 5  # rows of a sample
 
-# Numbers of the kernel: the reference's time σ, how far it is behind, and its derivatives.
-_TIME, _LAG, _RATE, _CHANGE, _EMERGENCY, _ELAPSED = 0, 1, 2, 3, 4, 5
-_CLOCK = slice(_LAG, _EMERGENCY + 1)
-_LOG_PSI, _PERIOD, _DELAY, _KAPPA, _POSITION_GAIN, _VELOCITY_GAIN = 6, 7, 8, 9, 10, 11
-_WANTED_RATE, _N_NUMBERS = 12, 13
+# Numbers of the kernel: the reference's time σ, how far it is behind, and its derivatives, which
+# are kept as they were at the last time that the kernel was asked for.
+_TIME, _LAG, _RATE, _CHANGE, _EMERGENCY, _LAST, _GOES_ON_FROM = 0, 1, 2, 3, 4, 5, 6
+_PERIOD, _DELAY, _KAPPA, _POSITION_GAIN, _VELOCITY_GAIN, _WANTED_RATE = 7, 8, 9, 10, 11, 12
+_N_NUMBERS = 13
+_KEPT = _N_NUMBERS - _LAG
 
 _EVADED_SHARE = 0.5  # of twice the acceleration limits, with which a return to the reference stops
 _HANDED_OVER = 0.001, 0.02  # of error, and of velocity or rate, that tracking takes over from
@@ -326,22 +317,24 @@ _LARGEST_GAIN = 0.4  # of K_v times the time that a torque is late
 
 @compiled
 def _tracking_torque(
+    t: float,
+    q: Array,
+    v: Array,
+    log_psi: float,
+    log_psi_gradient: Array,
     numbers: Array,
-    rows: Array,
     sample: Array,
     knots: Array,
-    joint_index: NDArray[np.int64],
-    log_psi_gradient: Array,
-    mass: Array,
-    nonlinear: Array,
-    gravity: Array,
-    sent: Array,
+    arrays: DynamicsArrays,
 ) -> float:
     """Write and send the torque of `DensityTracking`; return the tracking error.
 
     It is one kernel, of few arguments, since every call and every argument has its cost.
     """
-    period, elapsed, rate = numbers[_PERIOD], numbers[_ELAPSED], numbers[_RATE]
+    nonlinear, rows, joint_index, begins = arrays[1], arrays[3], arrays[6], take_in(t, q, v, arrays)
+    period, elapsed = numbers[_PERIOD], arrays[5][ELAPSED]
+    _advance_clock(t, begins, elapsed, numbers)
+    rate = numbers[_RATE]
     late = elapsed + numbers[_DELAY]
     u = (numbers[_TIME] + rate * numbers[_DELAY]) / period
     write_sample(u, u + 0.5 * rate * elapsed / period, period, knots, sample)
@@ -360,9 +353,7 @@ def _tracking_torque(
     if not math.isnan(numbers[_KAPPA]):
         distance = torus_distance(error, joint_index, sample[_WEIGHTS], numbers[_KAPPA])
         # In the reciprocal gauge with α = 1, as `require_smooth_goal` has it.
-        write_gauge_gradient(
-            log_psi_gradient, distance, error, 1.0, numbers[_LOG_PSI], 0.0, -1.0, attract
-        )
+        write_gauge_gradient(log_psi_gradient, distance, error, 1.0, log_psi, 0.0, -1.0, attract)
     weaker = min(1.0, _LARGEST_GAIN / (numbers[_VELOCITY_GAIN] * late))
     stiffness, damping = numbers[_POSITION_GAIN] * weaker**2, numbers[_VELOCITY_GAIN] * weaker
     for i in range(n):
@@ -379,8 +370,8 @@ def _tracking_torque(
     if numbers[_EMERGENCY] > 0.0:
         for i in range(n):
             rows[RATE_LIMIT, i] = math.inf
-    robust_torque(mass, nonlinear, damping, elapsed, late, rows)
-    send(gravity, rows, sent)
+    robust_torque(damping, elapsed, late, arrays)
+    send(arrays)
     waiting = max(largest - _FREE_ERROR, 0.0) / _WAITING_ERROR
     wanted = numbers[_WANTED_RATE] * math.sqrt(max(left, _LEAST_SHARE)) / (1.0 + waiting * waiting)
     step = min(_CLOCK_RATE * elapsed, 1.0)
@@ -389,3 +380,23 @@ def _tracking_torque(
         change = max(change, slowest)
     numbers[_CHANGE], numbers[_RATE] = change, max(rate + elapsed * change, 0.0)
     return largest
+
+
+@compiled_part
+def _advance_clock(t: float, begins: bool, elapsed: float, numbers: Array) -> None:
+    """Let the reference's time go on to t, by the rate that the last call found."""
+    if not math.isnan(numbers[_GOES_ON_FROM]):
+        numbers[_LAG], numbers[_RATE] = t - numbers[_GOES_ON_FROM], 0.0
+        numbers[_CHANGE] = numbers[_EMERGENCY] = 0.0
+        numbers[_GOES_ON_FROM] = math.nan
+    elif begins or math.isnan(numbers[_TIME]):
+        numbers[_LAG] = numbers[_CHANGE] = numbers[_EMERGENCY] = 0.0
+        numbers[_RATE] = 1.0
+    elif t == numbers[_LAST]:  # asked again, which moves no clock
+        for k in range(_LAG, _LAST):
+            numbers[k] = numbers[k + _KEPT]
+    else:
+        numbers[_LAG] += (1.0 - numbers[_RATE]) * elapsed
+    for k in range(_LAG, _LAST):
+        numbers[k + _KEPT] = numbers[k]
+    numbers[_LAST], numbers[_TIME] = t, t - numbers[_LAG]

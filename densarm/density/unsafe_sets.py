@@ -126,6 +126,9 @@ class ClearanceSet:
         self.sensing_distance = positive_array("sensing_distance", sensing_distance, world.n_pairs)
         """σ_k (K,) [m], to be changed by `set_sensing_distance`."""
         self._standing = self.sensing_distance.copy()
+        pairs = self.pairs
+        jacobian, sign = pairs.kinematics.jacobian, world.sign
+        self._arrays = pairs.state, pairs.rows, jacobian, sign, self.margin, self.sensing_distance
         self.set_sensing_distance(self.sensing_distance)
 
     def set_sensing_distance(self, sensing_distance: Array) -> None:
@@ -145,16 +148,7 @@ class ClearanceSet:
             if np.count_nonzero(self._is_moving()) != self._n_moving:
                 self.set_sensing_distance(self._standing)
         pairs.update(q)
-        return _add_active_log_bumps(
-            pairs.state,
-            pairs.rows,
-            pairs.kinematics.jacobian,
-            self.world.sign,
-            self.margin,
-            self.sensing_distance,
-            theta,
-            out_gradient,
-        )
+        return _add_active_log_bumps(*self._arrays, theta, out_gradient)
 
     def _is_moving(self) -> NDArray[np.bool_]:
         world = self.world
