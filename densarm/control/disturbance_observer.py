@@ -93,6 +93,7 @@ class DisturbanceObserver:
         self._joint_index: NDArray[np.int64] = arm.joint_index
         self._factor = np.zeros((arm.nv, arm.nv))
         self._numbers = np.array([0.0, parameters.bandwidth, parameters.delay])
+        self._expected: Array | None = None  # beside each torque that was sent
         self._time = math.nan
 
     def begins(self, t: float) -> bool:
@@ -117,6 +118,12 @@ class DisturbanceObserver:
         elapsed = -1.0 if self.begins(t) else t - self._time
         self._time = t
         self._numbers[0] = elapsed
+        if self._expected is not None and elapsed != 0.0:
+            late = min(int(self.parameters.delay / elapsed + 0.5), len(self.sent) - 1)
+            self.rows[_NONLINEAR] -= self._expected[-1 - late]
+            self._expected[:-1] = self._expected[1:]
+            if elapsed < 0.0:
+                self._expected[:] = 0.0
         _observe(
             q,
             v,
@@ -130,6 +137,12 @@ class DisturbanceObserver:
             self._factor,
         )
         return max(elapsed, 0.0)
+
+    def expect(self, tau: Array) -> None:
+        """Reckon with a torque (nv,) that acts while the one sent last does [N·m or N]."""
+        if self._expected is None:
+            self._expected = np.zeros_like(self.sent)
+        self._expected[-1] = tau
 
     def set_bandwidth(self, bandwidth: float) -> None:
         """Use another L [1/s]."""

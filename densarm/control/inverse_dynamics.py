@@ -27,7 +27,9 @@ _ACCELERATION_LIMIT, EFFORT_LIMIT, RATE_LIMIT = N_ROWS + 5, N_ROWS + 6, N_ROWS +
 VELOCITY_LIMIT, INERTIA_FLOOR, _ZERO, TORQUE = N_ROWS + 8, N_ROWS + 9, N_ROWS + 10, N_ROWS + 11
 
 _FASTEST = 1e3  # [rad/s or m/s], where joints have no limit
-_LARGEST_LAG = 0.6  # of K_v (M + D) / M times the lag
+LARGEST_LAG = 0.6
+"""Of K_v (M + D) / M times the lag."""
+
 _FEEDBACK_RATE = 0.5  # of the torque rate, that feedback reckons with
 
 TRUSTED = ActuationParameters(bandwidth=0.0, inertia_floor=0.0)
@@ -116,6 +118,10 @@ class InverseDynamics:
             rate = self._arm.limits.torque_rate
             self.rows[RATE_LIMIT] = math.inf if math.isnan(t) else elapsed * rate
         return elapsed
+
+    def expect(self, tau: Array) -> None:
+        """Reckon with a torque (nv,), no disturbance, that acts while the one sent last does."""
+        self._observer.expect(tau)
 
     def begins(self, t: float) -> bool:
         """Return whether an update at a time [s] knows of none before."""
@@ -252,7 +258,7 @@ def robust_torque(
             written.
     """
     n = nonlinear.shape[0]
-    feedback, bound = rows[_ATTRACT_TORQUE], _LARGEST_LAG / (gain * late) - 1.0
+    feedback, bound = rows[_ATTRACT_TORQUE], LARGEST_LAG / (gain * late) - 1.0
     for i in range(n):
         inertia = mass[i, i]
         floor = min(rows[INERTIA_FLOOR, i], max(bound, 0.0) * rows[FREE_INERTIA, i])

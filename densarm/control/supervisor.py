@@ -105,8 +105,7 @@ class Supervisor:
         self._fastest = np.where(np.isfinite(velocity), _FASTEST * velocity, _UNLIMITED_FASTEST)
         self._gains = gains
         self._patience = math.inf if patience is None else positive("patience", patience)
-        self._rested = 0.0
-        self._pauses = False  # whether the controller itself stops the arm
+        self._rested, self._pauses = 0.0, False  # whether the controller itself stops it
         self._handed_over: InverseDynamics | None = None  # what it is to go on from
         self._called = False  # whether it was, at this call
         self._has_braked = False  # during this stop
@@ -176,7 +175,8 @@ class Supervisor:
     @property
     def needs_brakes(self) -> bool:
         """Whether the arm rests as far as is known, but no state tells."""
-        return self.is_at_rest and not self.trusts_state
+        stopped = self._knows_state and self.status.fault != Fault.NONE and not self.trusts_state
+        return stopped and bool(np.abs(self._state[1]).max() <= _SLOW)  # a gentle stop ends later
 
     def stop(self, why: str = "The caller asked to stop.", *, at_once: bool = False) -> None:
         """Brake from the next call of `torque` on, and hold still.

@@ -182,7 +182,7 @@ def jumped(q: Array, v: Array) -> tuple[Array, Array]:
 def test_a_wrong_state_stops_the_arm_where_it_was_going(
     setting: Setting, seen: Seen, fault: Fault, fault_time: float
 ) -> None:
-    loop = Loop(setting).run(0.4)
+    loop = Loop(setting).run(0.36)
     q, v = loop.q, loop.v
     loop.run(fault_time, seen).run(0.8)
     assert np.abs(v).max() > 0.5
@@ -238,6 +238,22 @@ def test_a_delayed_state_stops_the_arm(setting: Setting) -> None:
     loop.run(1.5, seen)
     assert loop.fault == Fault.FROZEN
     assert np.abs(loop.v).max() < 0.01
+
+
+def test_brakes_are_asked_for_while_a_gentle_stop_still_ends(setting: Setting) -> None:
+    """Which is how a stop ends that a wrong state has begun and a right one gone on with."""
+    loop = Loop(setting).run(0.6)
+    loop.run(0.003, jumped).run(0.01)
+    for _ in range(1000):
+        if loop.supervisor.needs_brakes:
+            break
+        assert np.abs(loop.v).max() > 0.009
+        loop.run(DT, lambda q, v: (q, np.nan * v))
+    assert np.abs(loop.v).max() <= 0.01
+    assert not loop.supervisor.is_at_rest
+    loop.run(0.5)
+    assert loop.supervisor.is_at_rest
+    assert not loop.supervisor.needs_brakes
 
 
 @pytest.mark.parametrize("clock", [lambda _: np.nan, lambda t: t - 0.1])
