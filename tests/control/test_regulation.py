@@ -223,10 +223,11 @@ def test_each_call_is_held_back_by_the_jerk_after_a_pause_again(swing_up: Scenar
 
 # Rotors that the model leaves out.
 
-HEAVY_ROTORS = {"armature": 0.1, "viscous": 1.0}  # five times the inertia of a Panda's last link
+# Five times the inertia of a Panda's last link.
+HEAVY_ROTORS = Disturbances(armature=0.1, viscous=1.0)
 
 
-def wrist_turned(inertia_floor: float, **disturbances: float) -> Run:
+def wrist_turned(inertia_floor: float, disturbances: Disturbances = Disturbances()) -> Run:
     arm = load_arm("panda", shapes="capsule")
     world, start = World(arm, Scene()), arm.postures["ready"]
     goal = arm.integrate(start, np.array([0.0, 0.0, 0.0, 0.0, 0.5, 0.0, -0.5]))
@@ -235,14 +236,14 @@ def wrist_turned(inertia_floor: float, **disturbances: float) -> Run:
         world,
         DensityRegulation(world, goal, actuation=actuation),
         start,
-        disturbances=Disturbances(**disturbances),
+        disturbances=disturbances,
         parameters=SimulationParameters(time_limit=1.5),
     )
 
 
 @pytest.mark.slow
 def test_an_observer_that_reckons_with_rotors_keeps_a_wrist_that_has_them_from_swinging() -> None:
-    swings, steady = (wrist_turned(floor, **HEAVY_ROTORS) for floor in (0.0, 0.03))
+    swings, steady = (wrist_turned(floor, HEAVY_ROTORS) for floor in (0.0, 0.03))
     for run, reversals in ((swings, True), (steady, False)):
         fast = run.v[np.abs(run.v[:, 6]) > 0.02, 6]
         assert bool((fast > 0.0).any()) == reversals

@@ -248,12 +248,40 @@ def test_brakes_are_asked_for_while_a_gentle_stop_still_ends(setting: Setting) -
         if loop.supervisor.needs_brakes:
             break
         assert np.abs(loop.v).max() > 0.009
-        loop.run(DT, lambda q, v: (q, np.nan * v))
+        loop.run(DT, lambda q, v: (np.nan * q, v))
     assert np.abs(loop.v).max() <= 0.01
     assert not loop.supervisor.is_at_rest
     loop.run(0.5)
     assert loop.supervisor.is_at_rest
     assert not loop.supervisor.needs_brakes
+
+
+@pytest.mark.parametrize("wrong", [lambda v: np.nan * v, lambda v: v + 2.0, lambda v: 1e300 + v])
+def test_an_arm_whose_velocities_are_wrong_for_good_is_held_by_its_positions(
+    setting: Setting, wrong: Callable[[Array], Array]
+) -> None:
+    loop = Loop(setting).run(0.6)
+    loop.run(1.5, lambda q, v: (q, wrong(v)))
+    assert loop.supervisor.is_at_rest
+    assert loop.supervisor.trusts_state
+    assert not loop.supervisor.needs_brakes
+    q = loop.q
+    loop.push = np.array([0.3, -0.3])  # [rad/s²], as of a load that is not told
+    loop.run(2.0, lambda q, v: (q, wrong(v)))
+    assert np.abs(loop.arm.difference(q, loop.q)).max() < 0.02
+    assert not loop.supervisor.resume()
+    loop.run(0.1)
+    assert loop.supervisor.resume()
+
+
+@pytest.mark.parametrize("wrong", [lambda q: 1e300 + q, lambda q: q[:1], lambda q: 0.0 * q])
+def test_positions_that_are_none_or_stand_still_tell_no_velocity(
+    setting: Setting, wrong: Callable[[Array], Array]
+) -> None:
+    loop = Loop(setting).run(0.6)
+    loop.run(1.5, lambda q, v: (wrong(q), np.nan * v))
+    assert not loop.supervisor.trusts_state
+    assert loop.supervisor.needs_brakes
 
 
 @pytest.mark.parametrize("clock", [lambda _: np.nan, lambda t: t - 0.1])
