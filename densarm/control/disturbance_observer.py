@@ -97,10 +97,29 @@ class DisturbanceObserver:
         self.numbers: Array = np.array(
             [period, parameters.bandwidth, parameters.delay, math.nan, period]
         )
+        self._expected: Array | None = None  # beside each torque that was sent
 
     def begins(self, t: float) -> bool:
         """Return whether it begins anew at a time [s]."""
         return not 0.0 <= t - self.numbers[_TIME] <= _LONGEST_STEP
+
+    def expect(self, tau: Array) -> None:
+        """Reckon with a torque (nv,) that acts while the one sent last does [N·m or N]."""
+        if self._expected is None:
+            self._expected = np.zeros_like(self.sent)
+        self._expected[-1] = tau
+
+    def reckon(self, t: float) -> None:
+        """Add what was expected to the torque that has acted, before `observe` at a time [s]."""
+        if (expected := self._expected) is None or t == self.numbers[_TIME]:
+            return
+        if self.begins(t):
+            expected[:] = 0.0
+            return
+        elapsed = t - self.numbers[_TIME]
+        late = min(int(self.parameters.delay / elapsed + 0.5), len(self.sent) - 1)
+        self.rows[_NONLINEAR] -= expected[-1 - late]
+        expected[:-1] = expected[1:]
 
     def set_bandwidth(self, bandwidth: float) -> None:
         """Use another L [1/s]."""

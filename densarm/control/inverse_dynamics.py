@@ -35,7 +35,9 @@ DynamicsArrays = tuple[Array, Array, Array, Array, Array, Array, NDArray[np.int6
 inverse dynamics share."""
 
 _FASTEST = 1e3  # [rad/s or m/s], where joints have no limit
-_LARGEST_LAG = 0.6  # of K_v (M + D) / M times the lag
+LARGEST_LAG = 0.6
+"""Of K_v (M + D) / M times the lag."""
+
 _FEEDBACK_RATE = 0.5  # of the torque rate, that feedback reckons with
 
 TRUSTED = ActuationParameters(bandwidth=0.0, inertia_floor=0.0)
@@ -114,6 +116,7 @@ class InverseDynamics:
         if self._updates_kinematics:
             self._kinematics.update(q)
         self.compute_terms(q, v)
+        self._observer.reckon(t)
         _take_in(float(t), q, v, self.arrays)  # another number would have it compiled again
         return self.elapsed
 
@@ -127,6 +130,10 @@ class InverseDynamics:
     def elapsed(self) -> float:
         """The time between the last two updates, or a period [s]."""
         return float(self._observer.numbers[ELAPSED])
+
+    def expect(self, tau: Array) -> None:
+        """Reckon with a torque (nv,), no disturbance, that acts while the one sent last does."""
+        self._observer.expect(tau)
 
     def begins(self, t: float) -> bool:
         """Return whether an update at a time [s] knows of none before."""
@@ -280,7 +287,7 @@ def robust_torque(gain: float, elapsed: float, late: float, arrays: DynamicsArra
     """
     mass, nonlinear, rows = arrays[0], arrays[1], arrays[3]
     n = nonlinear.shape[0]
-    feedback, bound = rows[_ATTRACT_TORQUE], _LARGEST_LAG / (gain * late) - 1.0
+    feedback, bound = rows[_ATTRACT_TORQUE], LARGEST_LAG / (gain * late) - 1.0
     for i in range(n):
         inertia = mass[i, i]
         floor = min(rows[INERTIA_FLOOR, i], max(bound, 0.0) * rows[FREE_INERTIA, i])

@@ -8,10 +8,16 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from densarm.arms.arm import Arm
+from densarm.arms.dynamics import Kinematics
 from densarm.control.controller import Gains, checked_state
-from densarm.control.disturbance_observer import ActuationParameters
+from densarm.control.disturbance_observer import FREE_INERTIA, ActuationParameters
 from densarm.control.evasion import Evasion
-from densarm.control.inverse_dynamics import TORQUE, InverseDynamics
+from densarm.control.inverse_dynamics import (
+    INERTIA_FLOOR,
+    LARGEST_LAG,
+    TORQUE,
+    InverseDynamics,
+)
 from densarm.control.sensing import require_smooth_goal
 from densarm.control.speed_law import SpeedLaw, SpeedParameters
 from densarm.control.stopping import BackupFilter
@@ -58,10 +64,11 @@ class FieldRegulation:
 
     With the field of the density, k = (K_p/K_v) ∇ρ at the speed of the speed law, this is [ZNV]
     eq. 17 with a constant q_d, its attraction scaled before its damping. d̂ is added to it: what the
-    model does not explain, by a `DisturbanceObserver`. Where the arm could no
-    longer stop in the free space ahead, it stops along a straight line. With `inertia_at`, a
-    configuration (nq,) whose largest inertia is the unit of the metric M, gradients are taken in
-    that, so that the torque itself points along them.
+    model does not explain, by a `DisturbanceObserver`, whose model has M + D. Else a joint whose
+    rotor has several times its inertia would swing, and circle the next sub-goal; D is bounded as
+    in `robust_torque`. Where the arm could no longer stop in the free space ahead, it stops along a
+    straight line. With `inertia_at`, a configuration (nq,) whose largest inertia is the unit of the
+    metric M, gradients are taken in that, so that the torque itself points along them.
 
     Source: [ZNV] eq. 17.
     """
@@ -89,7 +96,10 @@ class FieldRegulation:
         if arm.links_without_mass:
             return
         limit = HELD_SHARE * arm.limits.acceleration
-        self._dynamics = InverseDynamics(arm, limit, None, period, actuation)
+        self._kinematics = Kinematics(arm)
+        self._dynamics = InverseDynamics(arm, limit, self._kinematics, period, actuation)
+        late, self._floor = period + actuation.delay, np.zeros(arm.nv)
+        self._most_floor = max(LARGEST_LAG / (gains.velocity * late) - 1.0, 0.0)
         self._filter = BackupFilter(arm, speed_law, gains, period)
         self._dynamics.load()
 
@@ -101,7 +111,7 @@ class FieldRegulation:
         """
         self._arm.require_masses("torque")
         q, v = checked_state(self._arm, q, v)
-        self._dynamics.update(t, q, v)
+        self._update(t, q, v)
         v = self._dynamics.velocity
         metric = self._scale * self._dynamics.mass_matrix() if self._scale > 0.0 else None
         velocity = self._limited(q, metric)
@@ -109,9 +119,30 @@ class FieldRegulation:
             evading, gives_way = self._evasion.velocity(q, v, velocity)
             if gives_way:
                 self._evasion.send_torque(self._dynamics, evading)
-                return np.array(self._dynamics.rows[TORQUE])
+                tau = np.array(self._dynamics.rows[TORQUE])
+                a = self._filter.acceleration(q, v, tau + self._dynamics.disturbance)
+                self._dynamics.expect(self._floor * a)
+                return tau
         wanted = self._dynamics.torque(-self._gain * v, self._gain * velocity)
-        return self._filter.torque(t, self._dynamics, q, v, wanted, self._field.distances)
+        tau = self._filter.torque(t, self._dynamics, q, v, wanted, self._field.distances)
+        self._dynamics.expect(self._floor * self._filter.last)
+        return tau
+
+    def _update(self, t: float, q: Array, v: Array) -> None:
+        """Update the dynamics, whose observer alone takes M for that of the arm and D.
+
+        What D would take of accelerations it is told to expect, so that an arm without rotors
+        moves as it would without D.
+        """
+        dynamics, floor, diagonal = self._dynamics, self._floor, slice(None, None, self._arm.nv + 1)
+        free = np.maximum(dynamics.rows[FREE_INERTIA] - floor, 0.0)  # as it was at the last call
+        np.minimum(dynamics.rows[INERTIA_FLOOR], self._most_floor * free, out=floor)
+        self._kinematics.update(q)
+        mass = self._kinematics.mass_matrix.flat
+        own = mass[diagonal]
+        mass[diagonal] = own + floor
+        dynamics.update(t, q, v)
+        mass[diagonal] = own
 
     @property
     def dynamics(self) -> InverseDynamics:

@@ -1,18 +1,25 @@
 """StateObserver: where the dynamics say that an arm is."""
 
 import math
+from collections import deque
 from dataclasses import dataclass
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from densarm.arms.arm import Arm
 from densarm.arms.joint_space import joint_error, write_configuration
+from densarm.control.controller import checked_state, is_plausible
 from densarm.values.arrays import Array
 from densarm.values.checks import positive
 from densarm.values.documented import documented
 from densarm.values.kernels import compiled
+
+FARTHEST = 1e6
+"""Beyond it a number is no position [rad or m]."""
+
+State = tuple[Array, Array]
 
 
 @documented
@@ -134,6 +141,55 @@ class StateObserver:
             self._unexplained,
         )
 
+
+class ByPositions:
+    """Replaces velocities that are not those of the positions, once it has seen nine of these.
+
+    Positions that repeat tell nothing: those of an arm at rest differ in some bit.
+
+    Args:
+        arm: the arm.
+        fastest: bound on a velocity (nv,) [rad/s or m/s].
+
+    Attributes:
+        replaces: whether it replaced the velocity of the last state.
+    """
+
+    def __init__(self, arm: Arm, fastest: Array) -> None:
+        self._arm, self._fastest, self._rest = arm, fastest, np.zeros(arm.nv)
+        self._past: deque[tuple[Array, float]] = deque(maxlen=_DIFFERENCES + 1)
+        self.replaces = False
+
+    def clear(self) -> None:
+        """Forget what was seen."""
+        self.replaces = False
+        self._past.clear()
+
+    def state(self, measured: State | None, q: ArrayLike, dt: float) -> State | None:
+        """Return a state as measured, or of q (nq,) as given and its differences.
+
+        The time is that since the last call [s].
+        """
+        self.replaces = False
+        try:
+            position = np.array(checked_state(self._arm, q, self._rest)[0])
+        except Exception:  # noqa: BLE001  # a caller may give anything
+            position = np.full(self._arm.nq, np.inf)
+        repeats = bool(self._past) and np.array_equal(self._past[-1][0], position)
+        if repeats or not is_plausible(position, self._rest, FARTHEST, self._fastest):
+            self.clear()
+            return measured
+        self._past.append((position, dt))
+        time = sum(step for _, step in list(self._past)[1:])
+        if len(self._past) <= _DIFFERENCES or not time > 0.0:
+            return measured
+        v = self._arm.difference(self._past[0][0], position) / time
+        if measured is None or not np.abs(v - measured[1]).max() <= _DIFFERENT:
+            self.replaces, measured = True, (position, v)
+        return measured
+
+
+_DIFFERENCES, _DIFFERENT = 8, 0.25  # of positions, and of velocities [rad/s or m/s]
 
 _UNEXPLAINED, _TORQUE, _PUSH, _SCALE, _MEAN = 0, 1, 2, 3, 4
 _LATER_MEMORY, _LATER_VELOCITY = 5.0, 0.25  # parts of the tolerances without learning

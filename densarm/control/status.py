@@ -40,3 +40,8 @@ class Status:
     """What it was."""
     sentence: str = "The controller acts."
     """The same in words, with the time and the values."""
+
+
+def one_line(text: object) -> str:
+    """Return what a caller or controller gave, as it fits into a sentence."""
+    return " ".join(str(text).split())[:300]

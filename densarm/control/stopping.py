@@ -124,6 +124,9 @@ class BackupFilter:
     as unaccelerated. The jerk of stopping is not limited.
 
     The period is the time that a torque is held [s].
+
+    Attributes:
+        last: a_k, what the model makes of the torque sent last (nv,) [rad/s²].
     """
 
     def __init__(self, arm: Arm, speed_law: SpeedLaw, gains: Gains, period: float) -> None:
@@ -134,7 +137,7 @@ class BackupFilter:
         self._stopping = StoppingTrajectory(arm)
         smoothing_time = 1.0 / gains.velocity
         self._step = arm.limits.acceleration * (period / smoothing_time)
-        self._last, self._time = np.zeros(arm.nv), math.nan
+        self.last, self._time = np.zeros(arm.nv), math.nan
 
     def torque(
         self,
@@ -150,27 +153,28 @@ class BackupFilter:
         The dynamics are updated at q (nq,) and v (nv,), where the distances of all pairs are these.
         """
         if not abs(t - self._time) <= 1.5 * self._period:
-            self._last = np.zeros_like(wanted)
+            self.last = np.zeros_like(wanted)
         self._time = t
         unknown = dynamics.disturbance
-        a, tau = self._acceleration(q, v, wanted + unknown), wanted
-        change = a - self._last
+        a, tau = self.acceleration(q, v, wanted + unknown), wanted
+        change = a - self.last
         excess = float((np.abs(change) / self._step).max())
         if not excess <= 1.0:
             limit = self._arm.limits.effort
-            tau = pin.rnea(self._arm.model, self._data, q, v, self._last + change / excess)
+            tau = pin.rnea(self._arm.model, self._data, q, v, self.last + change / excess)
             tau = np.asarray(np.clip(tau - unknown, -limit, limit))
         tau = dynamics.send(tau)
-        a = self._acceleration(q, v, tau + unknown)
+        a = self.acceleration(q, v, tau + unknown)
         v_next = v + self._period * a
         motion = self._period * np.maximum(np.abs(v), np.abs(v_next))
         q_next = self._arm.integrate(q, self._period * v_next)
         if not self._speed_law.can_stop(q_next, v_next, distances, motion):
             tau = dynamics.brake_torque(v, self._stopping.duration(q, v), self._period)
             tau = dynamics.send(tau, is_emergency=True)
-            a = self._acceleration(q, v, tau + unknown)
-        self._last = a
+            a = self.acceleration(q, v, tau + unknown)
+        self.last = a
         return tau
 
-    def _acceleration(self, q: Array, v: Array, tau: Array) -> Array:
+    def acceleration(self, q: Array, v: Array, tau: Array) -> Array:
+        """Return what a torque (nv,) makes of q (nq,) and v (nv,) [rad/s²]."""
         return np.array(pin.aba(self._arm.model, self._data, q, v, tau))

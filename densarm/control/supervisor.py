@@ -16,8 +16,8 @@ from densarm.control.controller import (
 )
 from densarm.control.course import Course
 from densarm.control.inverse_dynamics import InverseDynamics
-from densarm.control.state_observer import StateObserver, Tolerances
-from densarm.control.status import Fault, Status
+from densarm.control.state_observer import FARTHEST, ByPositions, StateObserver, Tolerances
+from densarm.control.status import Fault, Status, one_line
 from densarm.control.stopping import StopAndHold
 from densarm.planning.motion import Motion
 from densarm.values.arrays import Array
@@ -28,7 +28,6 @@ HOLDING_GAINS = Gains(position=50.0, velocity=15.0)
 
 _FASTEST = 10.0  # of the velocity limits: beyond it a number is no velocity
 _UNLIMITED_FASTEST = 100.0  # [rad/s or m/s]
-_FARTHEST = 1e6  # [rad or m]
 _LONGEST_PREDICTION = 0.25  # [s]
 _SLOW = 0.01  # [rad/s or m/s], which counts as rest
 
@@ -52,7 +51,8 @@ class Supervisor:
     told to, and what the controller raises goes through.
 
     What it rests on. A measured state that does not agree is left out, and the arm is braked where
-    the dynamics say that it is; one that then agrees with itself for the time `delay` is believed.
+    the dynamics say that it is; one that then agrees with itself for the time `delay` is believed,
+    its velocity being that of the positions where the measured one is another.
     Without any believable state the arm is held by the torque that the model's gravity asks for at
     the observed rest, and by what was learned of that before. That is no feedback: what is not
     known moves the arm unseen, and an arm held upright falls in the end. Close mechanical brakes
@@ -105,8 +105,7 @@ class Supervisor:
         self._fastest = np.where(np.isfinite(velocity), _FASTEST * velocity, _UNLIMITED_FASTEST)
         self._gains = gains
         self._patience = math.inf if patience is None else positive("patience", patience)
-        self._rested = 0.0
-        self._pauses = False  # whether the controller itself stops the arm
+        self._rested, self._pauses = 0.0, False  # whether the controller itself stops it
         self._handed_over: InverseDynamics | None = None  # what it is to go on from
         self._called = False  # whether it was, at this call
         self._has_braked = False  # during this stop
@@ -117,6 +116,7 @@ class Supervisor:
         self._last_q = b""  # as measured
         self._knows_state = self._brakes_anew = self._needs_plan = False
         self._state = arm.configuration(np.zeros(arm.nv)), np.zeros(arm.nv)
+        self._by_positions = ByPositions(arm, self._fastest)
         if not self._is_trusting:  # kernels are loaded, or compiled, here rather than in a loop
             self._brake.begin(*self._state)
             takes_torque(self._tau, arm.limits.effort, self._tau)
@@ -176,7 +176,8 @@ class Supervisor:
     @property
     def needs_brakes(self) -> bool:
         """Whether the arm rests as far as is known, but no state tells."""
-        return self.is_at_rest and not self.trusts_state
+        stopped = self._knows_state and self.status.fault != Fault.NONE and not self.trusts_state
+        return stopped and bool(np.abs(self._state[1]).max() <= _SLOW)  # a gentle stop ends later
 
     def stop(self, why: str = "The caller asked to stop.", *, at_once: bool = False) -> None:
         """Brake from the next call of `torque` on, and hold still.
@@ -210,7 +211,7 @@ class Supervisor:
             Whether it acts.
         """
         acts = self.status.fault == Fault.NONE
-        if not acts and not (self.is_at_rest and self.trusts_state):
+        if not (acts or (self.is_at_rest and self.trusts_state)) or self._by_positions.replaces:
             return False
         if self._needs_plan and controller is None:
             return False
@@ -225,6 +226,7 @@ class Supervisor:
         self._needs_plan = self._pauses = False
         if not self._is_trusting:
             self._observer.learns = True
+        self._by_positions.clear()
         self.status, self._time, self._rested, self._has_braked = Status(), None, 0.0, False
         return True
 
@@ -239,6 +241,8 @@ class Supervisor:
             return self._controllers_torque(t, q, v, self._period)
         dt = self._elapsed(t)
         measured = checked_state(self._arm, q, v) if self._is_trusting else self._measured(t, q, v)
+        if self.status.fault != Fault.NONE and not self._is_trusting:
+            measured = self._by_positions.state(measured, q, dt)
         if self._is_trusting and measured is not None:
             self._state, self._knows_state, self.trusts_state = measured, True, True
         else:
@@ -298,9 +302,9 @@ class Supervisor:
         try:
             q, v = checked_state(self._arm, q, v)
         except Exception as error:  # noqa: BLE001  # a caller may give anything
-            self._stop(Fault.NOT_A_STATE, f"At t = {t} s, {_one_line(error)}.")
+            self._stop(Fault.NOT_A_STATE, f"At t = {t} s, {one_line(error)}.")
             return None
-        if is_plausible(q, v, _FARTHEST, self._fastest):
+        if is_plausible(q, v, FARTHEST, self._fastest):
             return q, v
         largest = f"velocities up to {np.abs(v).max():.3g}, positions up to {np.abs(q).max():.3g}"
         self._stop(Fault.NOT_A_STATE, f"At t = {t} s the state is beyond reason: {largest}.")
@@ -363,7 +367,7 @@ class Supervisor:
             tau = np.asarray(self._controllers_torque(t, q, v, dt), dtype=np.float64)
             off, is_astray = self._course.fault(q)
         except Exception as error:  # noqa: BLE001  # whatever fails, the arm must be stopped
-            self._stop(Fault.NO_TORQUE, f"At t = {t} s the controller failed: {_one_line(error)}.")
+            self._stop(Fault.NO_TORQUE, f"At t = {t} s the controller failed: {one_line(error)}.")
             return False
         if off and (self.status.fault == Fault.NONE or is_astray):
             sentence = f"At t = {t} s the arm is off the controller's reference by {off}."
@@ -372,7 +376,7 @@ class Supervisor:
             return False
         if tau.shape == limit.shape and takes_torque(tau, limit, self._tau):
             return True
-        why = f"{_one_line(tau)}, and the limits are {_one_line(limit)}"
+        why = f"{one_line(tau)}, and the limits are {one_line(limit)}"
         self._stop(Fault.NO_TORQUE, f"At t = {t} s the controller gave {why}.")
         return False
 
@@ -404,7 +408,3 @@ class Supervisor:
         tau = self._brake.torque(*self._state, dt)
         if not takes_torque(tau, self._arm.limits.effort, self._tau):
             self._tau[:] = 0.0
-
-
-def _one_line(text: object) -> str:
-    return " ".join(str(text).split())[:300]

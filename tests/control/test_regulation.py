@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 from densarm.arms.arm import Arm, load_arm
 from densarm.certificates.task import SimulationParameters
 from densarm.control.controller import Gains
+from densarm.control.disturbance_observer import ActuationParameters
 from densarm.control.inverse_dynamics import TRUSTED
 from densarm.control.regulation import DensityRegulation, FieldRegulation
 from densarm.control.speed_law import SpeedLaw, SpeedParameters
@@ -24,7 +25,9 @@ from densarm.errors import InvalidValueError
 from densarm.planning.motion import Motion
 from densarm.scenarios.scenario import Scenario
 from densarm.scene.scene import Scene
+from densarm.simulation.disturbances import Disturbances
 from densarm.simulation.plants import SingleIntegrator
+from densarm.simulation.run import Run
 from densarm.simulation.simulate import simulate
 from densarm.values.arrays import Array
 from densarm.values.outcome import Outcome
@@ -216,6 +219,42 @@ def test_each_call_is_held_back_by_the_jerk_after_a_pause_again(swing_up: Scenar
     assert (np.abs(first) <= largest * (1.0 + 1e-6)).all()
     np.testing.assert_allclose(second, 2.0 * first, rtol=1e-6)
     np.testing.assert_allclose(acceleration(7.0), first, rtol=1e-6)
+
+
+# Rotors that the model leaves out.
+
+# Five times the inertia of a Panda's last link.
+HEAVY_ROTORS = Disturbances(armature=0.1, viscous=1.0)
+
+
+def wrist_turned(inertia_floor: float, disturbances: Disturbances = Disturbances()) -> Run:
+    arm = load_arm("panda", shapes="capsule")
+    world, start = World(arm, Scene()), arm.postures["ready"]
+    goal = arm.integrate(start, np.array([0.0, 0.0, 0.0, 0.0, 0.5, 0.0, -0.5]))
+    actuation = ActuationParameters(inertia_floor=inertia_floor)
+    return simulate(
+        world,
+        DensityRegulation(world, goal, actuation=actuation),
+        start,
+        disturbances=disturbances,
+        parameters=SimulationParameters(time_limit=1.5),
+    )
+
+
+@pytest.mark.slow
+def test_an_observer_that_reckons_with_rotors_keeps_a_wrist_that_has_them_from_swinging() -> None:
+    swings, steady = (wrist_turned(floor, HEAVY_ROTORS) for floor in (0.0, 0.03))
+    for run, reversals in ((swings, True), (steady, False)):
+        fast = run.v[np.abs(run.v[:, 6]) > 0.02, 6]
+        assert bool((fast > 0.0).any()) == reversals
+        assert (run.outcome == Outcome.REACHED) != reversals
+
+
+@pytest.mark.slow
+def test_an_arm_without_rotors_moves_as_if_none_were_reckoned_with() -> None:
+    without, with_floor = wrist_turned(0.0), wrist_turned(0.03)
+    np.testing.assert_allclose(with_floor.q, without.q, rtol=0, atol=1e-5)
+    assert with_floor.certified
 
 
 # What is given.

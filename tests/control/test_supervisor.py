@@ -182,7 +182,7 @@ def jumped(q: Array, v: Array) -> tuple[Array, Array]:
 def test_a_wrong_state_stops_the_arm_where_it_was_going(
     setting: Setting, seen: Seen, fault: Fault, fault_time: float
 ) -> None:
-    loop = Loop(setting).run(0.4)
+    loop = Loop(setting).run(0.36)
     q, v = loop.q, loop.v
     loop.run(fault_time, seen).run(0.8)
     assert np.abs(v).max() > 0.5
@@ -238,6 +238,50 @@ def test_a_delayed_state_stops_the_arm(setting: Setting) -> None:
     loop.run(1.5, seen)
     assert loop.fault == Fault.FROZEN
     assert np.abs(loop.v).max() < 0.01
+
+
+def test_brakes_are_asked_for_while_a_gentle_stop_still_ends(setting: Setting) -> None:
+    """Which is how a stop ends that a wrong state has begun and a right one gone on with."""
+    loop = Loop(setting).run(0.6)
+    loop.run(0.003, jumped).run(0.01)
+    for _ in range(1000):
+        if loop.supervisor.needs_brakes:
+            break
+        assert np.abs(loop.v).max() > 0.009
+        loop.run(DT, lambda q, v: (np.nan * q, v))
+    assert np.abs(loop.v).max() <= 0.01
+    assert not loop.supervisor.is_at_rest
+    loop.run(0.5)
+    assert loop.supervisor.is_at_rest
+    assert not loop.supervisor.needs_brakes
+
+
+@pytest.mark.parametrize("wrong", [lambda v: np.nan * v, lambda v: v + 2.0, lambda v: 1e300 + v])
+def test_an_arm_whose_velocities_are_wrong_for_good_is_held_by_its_positions(
+    setting: Setting, wrong: Callable[[Array], Array]
+) -> None:
+    loop = Loop(setting).run(0.6)
+    loop.run(1.5, lambda q, v: (q, wrong(v)))
+    assert loop.supervisor.is_at_rest
+    assert loop.supervisor.trusts_state
+    assert not loop.supervisor.needs_brakes
+    q = loop.q
+    loop.push = np.array([0.3, -0.3])  # [rad/s²], as of a load that is not told
+    loop.run(2.0, lambda q, v: (q, wrong(v)))
+    assert np.abs(loop.arm.difference(q, loop.q)).max() < 0.02
+    assert not loop.supervisor.resume()
+    loop.run(0.1)
+    assert loop.supervisor.resume()
+
+
+@pytest.mark.parametrize("wrong", [lambda q: 1e300 + q, lambda q: q[:1], lambda q: 0.0 * q])
+def test_positions_that_are_none_or_stand_still_tell_no_velocity(
+    setting: Setting, wrong: Callable[[Array], Array]
+) -> None:
+    loop = Loop(setting).run(0.6)
+    loop.run(1.5, lambda q, v: (wrong(q), np.nan * v))
+    assert not loop.supervisor.trusts_state
+    assert loop.supervisor.needs_brakes
 
 
 @pytest.mark.parametrize("clock", [lambda _: np.nan, lambda t: t - 0.1])

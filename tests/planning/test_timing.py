@@ -250,7 +250,7 @@ def test_a_motion_too_long_is_refused_before_it_is_made(
 @pytest.fixture(scope="module")
 def bend() -> Bend:
     """A path around a bend, and a ball that it misses but stopping from a fast motion does not."""
-    arm = load_arm("two_link")
+    arm = load_arm("two_link", jerk=np.inf)
     ball = Scene([Sphere(name="ball", radius=0.1, position=(1.487, 0.0, 1.337))])
     path = free_path(arm, [[0.0, 0.0], [2.4, 0.0], [2.4, -2.4]])
     return arm, path, StoppingCheck(World(arm, ball), StoppingTrajectory(arm))
