@@ -164,6 +164,11 @@ def random(arm: str, scenes: str, problems: int, seed: int, jobs: int, **options
     help="JSON file of problems.",
 )
 @number_option("--every", 1, "Run one problem of so many.")
+@choice_option(
+    "--goals",
+    ["configuration", "pose"],
+    "What is to be reached: the goal of the file, or the hand's pose at it, by any configuration.",
+)
 @_set_options
 def motionbenchmaker(problems: Path, every: int, **options: Any) -> None:
     """Run problems of MotionBenchMaker's collection.
@@ -176,6 +181,7 @@ def motionbenchmaker(problems: Path, every: int, **options: Any) -> None:
     \b
     Example:
       densarm bench motionbenchmaker --problems panda.json --every 10 --json results.json
+      densarm bench motionbenchmaker --problems panda.json --goals pose
       densarm bench motionbenchmaker --problems panda.json --plant mujoco --draw mass_scale=0.1
     """  # noqa: D301
     with progress() as report:
