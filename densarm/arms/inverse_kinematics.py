@@ -64,8 +64,10 @@ class InverseKinematics:
         starts = np.vstack([wanted, random.uniform(lower, upper, (_STARTS, arm.nv))])
         first, out = 0, np.empty((2, arm.nv))
         while (first := solve(self._mechanism, self._target, starts, first, wanted, out)) > 0:
-            ways = np.array([self._turned_near(angles, wanted) for angles in out[::-1]])
-            yield tuple(arm.configurations(ways))
+            ways = np.array([self._turned_near(angles, wanted) for angles in out])
+            # A pull that meets limits may lead away.
+            nearer = np.argsort(np.linalg.norm(ways - wanted, axis=1), kind="stable")
+            yield tuple(arm.configurations(ways[nearer]))
 
     def shortfall(self) -> str:
         """Return, as a phrase, how far the nearest to the pose is that can be reached."""

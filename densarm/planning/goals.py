@@ -18,10 +18,12 @@ from densarm.values.outcome import Outcome
 from densarm.world.configurations import infeasibility
 from densarm.world.swept_check import SweptCheck
 
-Goal = ArrayLike | Pose | Sequence[ArrayLike | Pose]
+Goal = ArrayLike | Pose | Sequence[object]
 """A configuration (nq,), a pose, or several of them, of which any will do."""
 
 _WORTH = 0.97  # of the cost of a way, above which another goal is not tried
+_CONTACT_COST = 0.3  # [s] of a goal in contact, which falls to none at the path's margin
+_ANY = 1e-9  # [m]
 _LENGTH_COST = (
     0.2  # [s/rad] of a way; bends cost time too, which limits of single joints do not see
 )
@@ -34,6 +36,8 @@ class Candidate(NamedTuple):
     """The configuration (nq,)."""
     least_cost: float
     """Cost of the straight way there, which none is below [s]."""
+    own_cost: float
+    """Cost of being near to contact there, included in that [s]."""
 
 
 def goal_list(arm: Arm, goal: Goal) -> list[Array | Pose]:
@@ -58,7 +62,12 @@ def goal_list(arm: Arm, goal: Goal) -> list[Array | Pose]:
 
 
 def candidates(
-    check: SweptCheck, start: Array, goals: Sequence[Array | Pose], seed: int, solutions: int
+    check: SweptCheck,
+    start: Array,
+    goals: Sequence[Array | Pose],
+    seed: int,
+    solutions: int,
+    path_margin: float,
 ) -> list[Candidate]:
     """Return configurations that are goals, or take a frame to one, of the least cost first.
 
@@ -68,6 +77,7 @@ def candidates(
         goals: as `goal_list` returns them.
         seed: of inverse kinematics.
         solutions: configurations for each pose at most.
+        path_margin: distance beyond the safety margin above which more is worth nothing [m].
 
     Raises:
         PlanningError: none is feasible, with the reason of each.
@@ -92,7 +102,11 @@ def candidates(
         faults += [fault] if fault else []
     if not found:
         raise PlanningError(Outcome.INFEASIBLE, "; ".join(faults))
-    ranked = [Candidate(q, way_cost(arm, np.stack([start, q]))) for q in found]
+    ranked = []
+    for q in found:
+        short = 1.0 - check.least_distance_margin(q[np.newaxis]) / max(path_margin, _ANY)
+        own_cost = _CONTACT_COST * float(np.clip(short, 0.0, 1.0))
+        ranked.append(Candidate(q, way_cost(arm, np.stack([start, q])) + own_cost, own_cost))
     return sorted(ranked, key=lambda candidate: candidate.least_cost)
 
 
@@ -145,14 +159,14 @@ def plan_to_any(
         if best := _least_cost(chosen, lambda q: tried(q, "density", 0)):
             return best
         vias = math.ceil(search.vias / len(chosen))
-        for way in (tried(q, "density", vias) for q, _ in chosen):
+        for way in (tried(q, "density", vias) for q, *_ in chosen):
             if way:
                 return way
     stuck = faults[0] if density_leads else ""
     if guide == "density":
         raise PlanningError(Outcome.STUCK, stuck)
     rest = "path" if density_leads else guide
-    for way in (tried(q, rest, search.vias) for q, _ in chosen):
+    for way in (tried(q, rest, search.vias) for q, *_ in chosen):
         if way:
             return replace(way, path=replace(way.path, stuck=way.path.stuck or stuck))
     also = f"; the density alone is stuck: {stuck}" if stuck else ""
@@ -163,10 +177,11 @@ def _least_cost(
     chosen: Sequence[Candidate], plan: Callable[[Array], PlannedPath | None]
 ) -> PlannedPath | None:
     best: PlannedPath | None = None
-    for q, least_cost in chosen:
-        if best and least_cost > _WORTH * best.cost:
+    least = math.inf
+    for q, least_cost, own_cost in chosen:
+        if least_cost > _WORTH * least:
             break
         way = plan(q)
-        if way and (best is None or way.cost < best.cost):
-            best = way
+        if way and way.cost + own_cost < least:
+            best, least = way, way.cost + own_cost
     return best

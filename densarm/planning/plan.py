@@ -192,7 +192,8 @@ def _planned(
     if fault := infeasibility(check, {"start": start}):
         raise PlanningError(Outcome.INFEASIBLE, fault)
     began = time.perf_counter()
-    chosen = candidates(check, start, goals, seed, search.solutions)[: search.goals]
+    found = candidates(check, start, goals, seed, search.solutions, path_margin)
+    chosen = found[: search.goals]
 
     def plan(q: Array, guide: str | Guide, search: PlanningParameters) -> PlannedPath:
         return _planned_to(legs, start, q, guide, seed, path_margin, search)

@@ -151,8 +151,9 @@ class Scenario:
         if len(goals) > 1 or isinstance(goals[0], Pose):
             object.__setattr__(self, "goals", tuple(goals))
             check, solutions = SweptCheck(self.world, self.control.margin), self.planning.solutions
-            nearest = candidates(check, start, goals, self.seed, solutions)[0].q
-            object.__setattr__(self, "goal", nearest)
+            margin = self.control.path_margin
+            ranked = candidates(check, start, goals, self.seed, solutions, margin)
+            object.__setattr__(self, "goal", ranked[0].q)
         else:
             object.__setattr__(self, "goal", goals[0])
         self.disturbances.require_fit(self.arm)
