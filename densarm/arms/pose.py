@@ -89,7 +89,8 @@ class Pose:
 
     def to_json(self) -> dict[str, Any]:
         """Return the pose as JSON data; `of_table` is its inverse."""
-        return asdict(self)
+        values = asdict(self).items()
+        return {key: list(value) if isinstance(value, tuple) else value for key, value in values}
 
     @property
     def placement(self) -> pin.SE3:
