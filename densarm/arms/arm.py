@@ -373,7 +373,7 @@ def load_arm(
         "density": density,
     }
     changes |= {key: value for key, value in chosen.items() if value is not None}
-    description = replace(description, **changes, frames={**description.frames, **(frames or {})})
+    description = replace(description, **changes)
     if cut := _listed(cut_joints):
         description = without_subtrees(description, cut)
     if joints is not None:
@@ -387,6 +387,7 @@ def load_arm(
         "armature": armature,
     }
     changes = {key: value for key, value in of_joints.items() if value is not None}
+    changes["frames"] = {**description.frames, **(frames or {})}
     return Arm(replace(description, **changes))
 
 

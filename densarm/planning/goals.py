@@ -170,7 +170,9 @@ def plan_to_any(
         if way:
             return replace(way, path=replace(way.path, stuck=way.path.stuck or stuck))
     also = f"; the density alone is stuck: {stuck}" if stuck else ""
-    raise PlanningError(Outcome.NO_PATH, f"of {len(chosen)} goals tried: {faults[-1]}{also}")
+    raise PlanningError(
+        Outcome.NO_PATH, f"of {len(chosen)} goals (planning.goals) none: {faults[-1]}{also}"
+    )
 
 
 def _least_cost(

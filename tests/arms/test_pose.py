@@ -10,6 +10,7 @@ import pytest
 
 from densarm.arms.arm import Arm, load_arm
 from densarm.arms.description import RobotDescription
+from densarm.arms.joints import without_subtrees
 from densarm.arms.pose import Pose
 from densarm.errors import DensarmError, InvalidValueError, UnknownNameError
 
@@ -87,6 +88,15 @@ def test_frames_of_ones_own_are_fixed_to_a_link(panda: Arm) -> None:
         off = own.pose(ready, "panda_hand").placement.actInv(own.pose(ready, "probe").placement)
         assert off.isApprox(probe.placement, 1e-12)
         assert own.end_effector == HAND
+
+
+def test_frames_of_what_is_cut_off_go_with_it() -> None:
+    tip = {"tip": Pose("panda_hand", [0.0, 0.0, 0.1])}
+    with pytest.raises(UnknownNameError, match="link for frame 'tip'"):
+        load_arm("panda", cut_joints=["panda_hand_joint"], frames=tip)
+    whole = load_arm("panda", frames=tip).description
+    cut = without_subtrees(whole, ["panda_hand_joint"])
+    assert cut.frames == {}
 
 
 @pytest.mark.parametrize(
