@@ -40,8 +40,8 @@ class Candidate(NamedTuple):
     """Cost of being near to contact there, included in that [s]."""
 
 
-def goal_list(arm: Arm, goal: Goal) -> list[Array | Pose]:
-    """Return the goals that are given, configurations checked.
+def goal_list(arm: Arm, goal: Goal, name: str = "goal") -> list[Array | Pose]:
+    """Return the goals that are given, configurations checked; errors call them by a name.
 
     Raises:
         InvalidValueError: no goal, or one that is neither configuration nor pose.
@@ -51,10 +51,10 @@ def goal_list(arm: Arm, goal: Goal) -> list[Array | Pose]:
     if isinstance(goal, list | tuple | np.ndarray) and not isinstance(goal, Pose):
         entries = list(goal)
         if not entries:
-            raise InvalidValueError("goal", goal, "a configuration, a densarm.Pose, or some")
+            raise InvalidValueError(name, goal, "a configuration, a densarm.Pose, or some")
         if any(isinstance(item, Pose) or np.ndim(item) > 0 for item in entries):
             given = entries
-    names = ["goal"] if len(given) == 1 else [f"goal {k + 1}" for k in range(len(given))]
+    names = [name] if len(given) == 1 else [f"{name} {k + 1}" for k in range(len(given))]
     return [
         item if isinstance(item, Pose) else arm.check_configuration(name, item)
         for name, item in zip(names, given, strict=True)

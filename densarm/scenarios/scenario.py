@@ -147,7 +147,7 @@ class Scenario:
         non_negative_integer("seed", self.seed)
         start = self.arm.check_configuration("start configuration", self.start)
         object.__setattr__(self, "start", start)
-        goals = goal_list(self.arm, self.goal)
+        goals = goal_list(self.arm, self.goal, "goal configuration")
         if len(goals) > 1 or isinstance(goals[0], Pose):
             object.__setattr__(self, "goals", tuple(goals))
             check, solutions = SweptCheck(self.world, self.control.margin), self.planning.solutions
@@ -221,7 +221,7 @@ class Scenario:
         return cls(
             **{key: getattr(task, key) for key in _SHARED},
             seed=settings.get("seed", 0),
-            goals=[_one_goal(task.arm, "goals", item) for item in settings.get("goals", ())],
+            goals=tuple(_one_goal(task.arm, "goals", item) for item in settings.get("goals", ())),
             disturbances=parse_table("disturbances", Disturbances, task.disturbances),
             **{
                 key: parse_table(key, TABLES[key], tables.get(key, {}))
@@ -324,7 +324,7 @@ class _RobotTable:
 @dataclass(frozen=True)
 class _TaskTable:
     start: str | tuple[float, ...] = ()
-    goal: Any = ()
+    goal: Any = field(default_factory=list)
 
 
 def _parse_robot(folder: Path, table: _RobotTable) -> Arm:
@@ -364,6 +364,10 @@ def _goal(arm: Arm, key: str, value: Any) -> Any:
 def _one_goal(arm: Arm, key: str, value: Any) -> Array | Pose:
     if isinstance(value, Mapping):
         return Pose.of_table(key, value)
+    if not isinstance(value, str | list):
+        raise InvalidValueError(
+            key, value, "joint positions, a posture, a pose, or a list of these"
+        )
     return _configuration(arm, key, value)
 
 
@@ -371,7 +375,7 @@ def _goals_json(arm: Arm, goals: Sequence[Array | Pose]) -> list[Any]:
     return [x.to_json() if isinstance(x, Pose) else arm.angles(x).tolist() for x in goals]
 
 
-def _configuration(arm: Arm, key: str, value: str | tuple[float, ...]) -> Array:
+def _configuration(arm: Arm, key: str, value: str | Sequence[float]) -> Array:
     if isinstance(value, str):
         if value not in arm.postures:
             raise UnknownNameError(f"posture for {key}", value, arm.postures)
