@@ -251,7 +251,8 @@ def ik(names: tuple[str, ...], poses: int, seed: int, json: Path | None) -> None
     """Time inverse kinematics, of arms and in scenarios by NAMES, or of all.
 
     Poses are those of configurations drawn evenly within the limits, so that each can be reached;
-    in a scenario what is found touches nothing. Found is within 0.1 mm and 1 mrad.
+    in a scenario what is found touches nothing. Found is within 0.1 mm and 1 mrad; times are of
+    the processor.
 
     \b
     Example:

@@ -56,7 +56,7 @@ class PlanningParameters:
     goals: int = 3
     """Configurations at most that a way is sought to, where any of several will do."""
 
-    solutions: int = 12
+    solutions: int = 8
     """Configurations at most, by inverse kinematics, that stand for a pose."""
 
     def __post_init__(self) -> None:

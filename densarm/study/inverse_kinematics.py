@@ -24,7 +24,7 @@ _WHOLE = 6  # joints from which on an arm is asked for whole poses
 
 @dataclass(frozen=True)
 class PoseResults:
-    """How many poses of a kind were found, and in what wall-clock time each."""
+    """How many poses of a kind were found, and in what processor time each."""
 
     where: str
     """The arm, or the scenario whose obstacles were kept clear of."""
@@ -116,12 +116,12 @@ def _timed(
     wanted = [_part(arm.pose(q), asked) for q in drawn]
     find(wanted[0])  # kernels are loaded
     for pose in wanted:
-        began = time.perf_counter()
+        began = time.process_time()
         try:
             q = find(pose)
         except DensarmError:
             q = None
-        times.append(1e3 * (time.perf_counter() - began))
+        times.append(1e3 * (time.process_time() - began))
         found += q is not None and _is_at(arm, pose, q)
     kind = f"free about {asked}" if asked in AXES else asked
     at = partial(np.percentile, times)
