@@ -3,6 +3,7 @@
 from .arms.arm import Arm as Arm
 from .arms.arm import load_arm as load_arm
 from .arms.free_body import free_body as free_body
+from .arms.pose import Pose as Pose
 from .certificates.certificate import Certificate as Certificate
 from .certificates.task import SimulationParameters as SimulationParameters
 from .control.controller import Controller as Controller
@@ -26,7 +27,6 @@ from .errors import DensarmError as DensarmError
 from .errors import FileContentError as FileContentError
 from .errors import InvalidValueError as InvalidValueError
 from .errors import RobotDescriptionError as RobotDescriptionError
-from .errors import SceneChangedError as SceneChangedError
 from .errors import UnknownNameError as UnknownNameError
 from .planning.guide import Guide as Guide
 from .planning.guide import NoPath as NoPath

@@ -225,3 +225,14 @@ def test_moving_goal(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixt
     assert 0.0 < clearance[0] < 60.0
     assert 10.0 < lags[0] < 100.0
     assert lags[1] < 0.1
+
+
+@pytest.mark.slow
+def test_pose_goal(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    run_example(monkeypatch, "pose_goal.py")
+    ways, run, certified, error = capsys.readouterr().out.splitlines()
+    assert ways.startswith("8 ways to the cup")
+    assert run.startswith("reached")
+    assert certified == "certified: True"
+    assert error.startswith("infeasible: goal: pose of 'panda_hand_tcp' at (1.4, 0, 0.3) m")
+    assert "out of reach: the nearest found is" in error

@@ -21,7 +21,8 @@ from densarm.arms.joints import (
     without_joints,
     without_subtrees,
 )
-from densarm.arms.models import build_models, build_visual_model, end_effector_frame
+from densarm.arms.models import build_models, build_visual_model, frame_index
+from densarm.arms.pose import Pose
 from densarm.arms.self_collision import ExcludedPair, srdf_postures
 from densarm.errors import InvalidValueError, RobotDescriptionError
 from densarm.scene.scene import Attachment
@@ -91,7 +92,9 @@ class Arm:
         self.limits: JointLimits = joint_limits(
             self.model, description, has_masses=not self.links_without_mass
         )
-        self.end_effector_frame = end_effector_frame(self.model, description.end_effector)
+        self.end_effector_frame = frame_index(
+            self.model, description.end_effector, "end-effector frame"
+        )
         self.end_effector: str = self.model.frames[self.end_effector_frame].name
         self.postures: dict[str, Array] = self._postures()
 
@@ -180,6 +183,13 @@ class Arm:
                     f"{name} of joint {self.joint_names[joint]!r}", pair.tolist(), "(cos, sin)"
                 )
         return vector
+
+    def pose(self, q: ArrayLike, frame: str | None = None) -> Pose:
+        """Return where a frame is, by its name or the end effector's, at a configuration (nq,)."""
+        at = frame_index(self.model, frame or self.end_effector)
+        pin.forwardKinematics(self.model, self.data, self.check_configuration("configuration", q))
+        pose = pin.SE3ToXYZQUAT(pin.updateFramePlacement(self.model, self.data, at))
+        return Pose(frame or self.end_effector, pose[:3] + self.origin, pose[3:])
 
     def difference(self, q_from: Array, q_to: Array) -> Array:
         """Return the tangent vector (..., nv) that leads from one configuration to another.
@@ -295,6 +305,7 @@ def load_arm(
     torque_rate: Vector | float | None = None,
     jerk: Vector | float | None = None,
     armature: Vector | float | None = None,
+    frames: Mapping[str, Pose] | None = None,
 ) -> Arm:
     """Load an arm by name or from a URDF file.
 
@@ -334,9 +345,11 @@ def load_arm(
         jerk: limits as those (nv,) [rad/s³ or m/s³].
         armature: inertia of the joints' rotors, times their gears' ratios squared, (nv,) or one for
             all joints [kg·m² or kg]; None for a known robot's own, or none.
+        frames: frames of one's own beside a known robot's, by name: each at the `Pose` that it has
+            in the frame of a link.
 
     Raises:
-        UnknownNameError: no such robot, or joint to move, lock or cut at.
+        UnknownNameError: no such robot, link, or joint to move, lock or cut at.
         InvalidValueError: a locked position or base placement that is not finite, a locked joint
             that shall be in the arm, shapes, links to collide as drawn or an inertia of another
             name, a density that is not positive or not read, limits that are not positive or of
@@ -374,6 +387,7 @@ def load_arm(
         "armature": armature,
     }
     changes = {key: value for key, value in of_joints.items() if value is not None}
+    changes["frames"] = {**description.frames, **(frames or {})}
     return Arm(replace(description, **changes))
 
 

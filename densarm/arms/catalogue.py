@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from densarm.arms.description import DATA_WHEEL, RobotDescription, resolve_path
+from densarm.arms.description import DATA_WHEEL, RobotDescription, own_frames, resolve_path
 from densarm.errors import UnknownNameError
 from densarm.values.files import read_text, read_toml
 
@@ -35,6 +35,7 @@ def robot_description(robot: str | Path) -> RobotDescription:
     folder = robots_folder() / path
     entry = read_toml(folder / "arm.toml")
     urdf, srdf = entry.pop("urdf"), entry.pop("srdf", None)
+    entry["frames"] = own_frames(entry.pop("frames", {}))
     return RobotDescription(
         name=str(robot),
         urdf=read_text(resolve_path(urdf, folder)),

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 from xml.parsers import expat
 
+from densarm.arms.pose import Pose
 from densarm.errors import DensarmError, InvalidValueError, RobotDescriptionError
 from densarm.scene.scene import Attachment
 from densarm.values.arrays import Vector
@@ -67,6 +68,8 @@ class RobotDescription:
     """Of masses from shapes [kg/m³]; None for 1000."""
     attachments: Sequence[Attachment] = ()
     """Bodies that the arm holds."""
+    frames: Mapping[str, Pose] = field(default_factory=dict)
+    """Frames of one's own by name, each at a pose in the frame of a link."""
 
     def __post_init__(self) -> None:
         one_of("shapes", self.shapes, ["hull", "pieces", "capsule"])
@@ -103,6 +106,7 @@ class RobotDescription:
             # Absent from what earlier versions wrote.
             values = {"collision_from_visual": "never", "attachments": (), **data}
             values["attachments"] = [Attachment.from_json(item) for item in values["attachments"]]
+            values["frames"] = own_frames(values.get("frames", {}))
             return cls(**values)
         except (TypeError, KeyError, AttributeError, ValueError) as error:
             raise DensarmError(f"robot description: {error}") from None
@@ -112,6 +116,13 @@ PER_JOINT = ("acceleration", "torque_rate", "jerk", "armature")
 """Fields that hold one number per joint."""
 
 _ALWAYS_RECORDED = ("postures", "package_dirs", "base_placement", "acceleration")
+
+
+def own_frames(tables: Any) -> dict[str, Pose]:
+    """Return `RobotDescription.frames` from tables of TOML or JSON."""
+    if not isinstance(tables, Mapping):
+        raise InvalidValueError("frames", tables, "a table of frames, each a table of its pose")
+    return {name: Pose.of_table(f"frames.{name}", table) for name, table in tables.items()}
 
 
 def _frozen(values: Any) -> Any:

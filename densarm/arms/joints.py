@@ -146,6 +146,7 @@ def without_subtrees(description: RobotDescription, joints: Iterable[str]) -> Ro
         srdf=None if srdf is None else _without_pairs(srdf, whole - kept_links),
         locked_joints={j: x for j, x in description.locked_joints.items() if j in kept_joints},
         end_effector=end if end in kept_links | kept_joints else None,
+        frames={k: x for k, x in description.frames.items() if x.frame in kept_links | kept_joints},
     )
 
 

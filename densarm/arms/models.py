@@ -2,7 +2,7 @@
 
 import os
 import xml.etree.ElementTree as ElementTree
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
@@ -24,6 +24,7 @@ from densarm.arms.masses import (
     links_without_inertial,
     needed_masses,
 )
+from densarm.arms.pose import Pose
 from densarm.arms.self_collision import (
     ExcludedPair,
     add_self_collision_pairs,
@@ -117,6 +118,7 @@ def build_models(description: RobotDescription) -> RobotModels:
             items = _attached_shapes(model, attachment)
             inertia = evenly_filled(items, attachment.mass)
             model.appendBodyToJoint(items[0].parentJoint, inertia, pin.SE3.Identity())
+    _add_frames(model, description.frames)
     remarks = (*urdf.remarks, *flat, *unknown_links(model, description.srdf))
     drawn = urdf.links_without_collision
     return RobotModels(model, *cut, files, drawn, remarks, needed, origin)
@@ -149,7 +151,7 @@ def robot_outline(description: RobotDescription) -> RobotOutline:
     return RobotOutline(model.nv, len(moving), len(geometry.collisionPairs), len(excluded))
 
 
-def end_effector_frame(model: pin.Model, name: str | None) -> int:
+def frame_index(model: pin.Model, name: str | None, kind: str = "frame") -> int:
     """Return the index of a frame, of the link where a joint shares its name; None for the last."""
     frames = list(model.frames)
     if name is None:
@@ -157,7 +159,7 @@ def end_effector_frame(model: pin.Model, name: str | None) -> int:
         return max(k for k, frame in enumerate(frames) if frame.parentJoint == last)
     named = [k for k, frame in enumerate(frames) if frame.name == name]
     if not named:
-        raise UnknownNameError("end-effector frame", name, [frame.name for frame in frames])
+        raise UnknownNameError(kind, name, {frame.name for frame in frames[1:]})
     return max(named, key=lambda k: bool(frames[k].type == pin.FrameType.BODY))
 
 
@@ -280,6 +282,19 @@ def _attach(
                 pair = pin.CollisionPair(min(index, other), max(index, other))
                 if not geometry.existCollisionPair(pair):
                     geometry.addCollisionPair(pair)
+
+
+def _add_frames(model: pin.Model, frames: Mapping[str, Pose]) -> None:
+    """Add frames of one's own, each given by its pose in the frame of a link."""
+    for name, pose in frames.items():
+        if pose.free is not None:
+            raise InvalidValueError(f"frames.{name}.free", pose.free, "none: a frame has one pose")
+        if model.existFrame(name):
+            raise InvalidValueError("name of frame", name, "other than those of the URDF's frames")
+        index = frame_index(model, pose.frame, f"link for frame {name!r}")
+        joint, link = model.frames[index].parentJoint, model.frames[index].placement
+        kind = pin.FrameType.OP_FRAME
+        model.addFrame(pin.Frame(name, joint, index, link * pose.placement, kind))
 
 
 def _attached_shapes(model: pin.Model, attachment: Attachment) -> list[pin.GeometryObject]:

@@ -1,5 +1,6 @@
 """``densarm run``: plan and simulate a scenario."""
 
+import tomllib
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +11,18 @@ from densarm.cli.options import number_option, output_option, picture_options, p
 from densarm.cli.output import print_run, progress, write_json, write_pictures
 
 
+def _read_goal(ctx: click.Context, param: click.Parameter, text: str | None) -> Any:
+    """Return a goal as TOML has it; a text that is none is the name of a posture."""
+    if text is None:
+        return None
+    try:
+        return tomllib.loads(f"goal = {text}")["goal"]
+    except (ValueError, RecursionError) as error:
+        if text.lstrip()[:1] in ("{", "["):
+            raise click.BadParameter(f"{text!r}: not as in TOML: {error}", ctx, param) from None
+        return text
+
+
 @click.command()
 @click.argument("scenario")
 @click.option(
@@ -17,6 +30,13 @@ from densarm.cli.output import print_run, progress, write_json, write_pictures
     type=click.Choice(["auto", "density", "direct", "path"]),
     help="What leads: the density, by via points where it is stuck, else a planner's path (auto); "
     "the first two; the first alone; the last.  [default: what the scenario says, else auto]",
+)
+@click.option(
+    "--goal",
+    callback=_read_goal,
+    metavar="GOAL",
+    help="In place of the scenario's, as in its file: a posture, [joint positions], a pose "
+    "{frame = ..., position = [...]}, or a list of these.",
 )
 @number_option(
     "--seed", None, "Seed of the planner.  [default: what the scenario says, else 0]", least=0
@@ -29,6 +49,7 @@ from densarm.cli.output import print_run, progress, write_json, write_pictures
 def run(
     scenario: str,
     guide: str | None,
+    goal: Any,
     seed: int | None,
     plant: str | None,
     disturb: dict[str, Any],
@@ -47,13 +68,14 @@ def run(
       densarm run swing_up --html swing_up.html
       densarm run panda_shelf --png panda_shelf.png --gif panda_shelf.gif
       densarm run panda_table --plant mujoco --disturb payload=1 --disturb coulomb=0.5
+      densarm run panda_table --goal '{frame = "panda_hand_tcp", position = [0.6, -0.2, 0.5]}'
       densarm run my_scenario.toml --guide direct --save run.npz --json run.json
     """  # noqa: D301
     with progress() as show:
         doing = "loading"
         show(doing)
         from densarm.scenarios.run import run as run_scenario
-        from densarm.scenarios.scenario import load_scenario
+        from densarm.scenarios.scenario import load_scenario, with_goal
         from densarm.simulation.disturbances import Disturbances
         from densarm.simulation.mujoco_plant import MujocoPlant
         from densarm.values.kernels import on_compiling
@@ -70,6 +92,8 @@ def run(
 
         with on_compiling(compiling) as compiled, compiling_meanwhile():
             chosen = load_scenario(scenario)
+            if goal is not None:
+                chosen = with_goal(chosen, "--goal", goal)
             told = parse_table(
                 "disturbances", Disturbances, {**chosen.disturbances.given, **disturb}
             )

@@ -53,8 +53,16 @@ class PlanningParameters:
     """Via points at most, from which the density leads to start and goal where it does not lead
     from one to the other."""
 
+    goals: int = 3
+    """Configurations at most that a way is sought to, where any of several will do."""
+
+    solutions: int = 8
+    """Configurations at most, by inverse kinematics, that stand for a pose."""
+
     def __post_init__(self) -> None:
         non_negative_integer("vias", self.vias)
+        positive_integer("goals", self.goals)
+        positive_integer("solutions", self.solutions)
         positive_integer("iterations", self.iterations)
         if not 0.0 <= self.near_share <= 1.0:
             raise InvalidValueError("near_share", self.near_share, "in [0, 1]")
@@ -74,6 +82,24 @@ class NoPath:
     """What was tried and what stood in the way, as a phrase."""
     remark: str = ""
     """As `GuidePath.remark`."""
+
+
+@dataclass(frozen=True, eq=False)
+class PlannedPath:
+    """A guide's answer, and what was kept from obstacles on the way."""
+
+    path: GuidePath
+    """The sub-goals."""
+    kept: Array
+    """Distance of each pair that the path keeps beyond the safety margin (K,) [m]; of sub-goals
+    that are not proved clear, what it shall keep."""
+    plan_time: float
+    """Wall-clock time that the guide took, and the choice of a goal [s]; zero for the direct
+    guide to a configuration."""
+    goal: Array
+    """The goal that it leads to (nq,)."""
+    cost: float
+    """What the way costs, as `way_cost` has it [s]."""
 
 
 class Guide(Protocol):

@@ -85,6 +85,8 @@ class Motion:
     """Safety margin m that it was planned with [m]."""
     path: GuidePath | None = None
     """The sub-goals that led it; None where none did."""
+    goal: Array | None = None
+    """Configuration that it was planned to (nq,), of several the one that was chosen."""
     plan_time: float = 0.0
     """Wall-clock time that the search for them took [s]; zero without a search."""
     detail: str = ""

@@ -2,20 +2,22 @@
 
 import math
 import time
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from densarm.arms.arm import Arm
+from densarm.arms.pose import Pose
 from densarm.density.goal_distance import TorusDistance
 from densarm.density.navigation_density import DensityParameters
 from densarm.density.sub_goals import GuidePath
 from densarm.density.unsafe_sets import SensingParameters
 from densarm.errors import InvalidValueError
 from densarm.planning.density_guide import ALONE, DensityGuide, Legs
-from densarm.planning.guide import Guide, NoPath, PlanningParameters
+from densarm.planning.goals import Goal, candidates, goal_list, plan_to_any, way_cost
+from densarm.planning.guide import Guide, NoPath, PlannedPath, PlanningParameters
 from densarm.planning.motion import Motion, PlanningError, TimingParameters
 from densarm.planning.path_guide import PathGuide
 from densarm.planning.shortening import shortened
@@ -58,23 +60,10 @@ _HALVINGS = 8  # of what a path keeps, until that is proved
 _STOP_SHARE = 0.5  # of the smooth path's that stopping keeps too; the rest is for tracking errors
 
 
-@dataclass(frozen=True, eq=False)
-class PlannedPath:
-    """A guide's answer, and what was kept from obstacles on the way."""
-
-    path: GuidePath
-    """The sub-goals."""
-    kept: Array
-    """Distance of each pair that the path keeps beyond the safety margin (K,) [m]; of sub-goals
-    that are not proved clear, what it shall keep."""
-    plan_time: float
-    """Wall-clock time that the guide took [s]; zero for the direct guide."""
-
-
 def plan_motion(
     world: World,
     start: ArrayLike,
-    goal: ArrayLike,
+    goal: Goal,
     guide: str | Guide = "auto",
     *,
     margin: float = 0.0,
@@ -98,7 +87,9 @@ def plan_motion(
     Args:
         world: the arm among obstacles.
         start: configuration (nq,).
-        goal: configuration (nq,).
+        goal: configuration (nq,), pose, or a list of these, of which any will do. The density leads
+            to the `search.goals` nearest of them and of the poses' configurations, unless a
+            straight way would cost more than what was found; the least cost is what counts.
         guide: supplies the sub-goals: one of `GUIDES`, or a `Guide`.
         margin: safety margin m [m]; it must hold at start and goal too.
         seed: of the guide's random choices.
@@ -132,6 +123,7 @@ def plan_motion(
         _timed(world, margin, kept, points, period, timing, time_limit),
         margin=margin,
         path=planned.path,
+        goal=planned.goal,
         plan_time=planned.plan_time,
         detail=stuck,
         remark=remark,
@@ -145,7 +137,7 @@ def plan_motion(
 def plan_path(
     world: World,
     start: ArrayLike,
-    goal: ArrayLike,
+    goal: Goal,
     guide: str | Guide = "auto",
     *,
     margin: float = 0.0,
@@ -180,21 +172,48 @@ def _legs(
 def _planned(
     legs: Legs,
     start: ArrayLike,
-    goal: ArrayLike,
+    goal: Goal,
     guide: str | Guide,
     seed: int,
     path_margin: float,
     search: PlanningParameters,
 ) -> PlannedPath:
     check = legs.check
-    world, arm, margin = check.world, check.arm, check.margin
-    start, goal = arm.check_configuration("start", start), arm.check_configuration("goal", goal)
+    arm, goals = check.arm, goal_list(check.arm, goal)
+    start = arm.check_configuration("start", start)
     non_negative_integer("seed", seed)
     non_negative("path_margin", path_margin)
     if isinstance(guide, str):
         one_of("guide", guide, GUIDES)
-    if fault := infeasibility(check, {"start": start, "goal": goal}):
+    if len(goals) == 1 and not isinstance(goals[0], Pose):
+        if fault := infeasibility(check, {"start": start, "goal": goals[0]}):
+            raise PlanningError(Outcome.INFEASIBLE, fault)
+        return _planned_to(legs, start, goals[0], guide, seed, path_margin, search)
+    if fault := infeasibility(check, {"start": start}):
         raise PlanningError(Outcome.INFEASIBLE, fault)
+    began = time.perf_counter()
+    found = candidates(check, start, goals, seed, search.solutions, path_margin)
+    chosen = found[: search.goals]
+
+    def plan(q: Array, guide: str | Guide, search: PlanningParameters) -> PlannedPath:
+        return _planned_to(legs, start, q, guide, seed, path_margin, search)
+
+    planned = plan_to_any(chosen, guide, search, plan)
+    return replace(planned, plan_time=time.perf_counter() - began)
+
+
+def _planned_to(
+    legs: Legs,
+    start: Array,
+    goal: Array,
+    guide: str | Guide,
+    seed: int,
+    path_margin: float,
+    search: PlanningParameters,
+) -> PlannedPath:
+    """Plan to one goal that is feasible, as is the start."""
+    check = legs.check
+    world, arm, margin = check.world, check.arm, check.margin
     depart, arrive = (inside_limits(check, q) for q in (start, goal))
     ends = np.min([check.distance_margin(q) for q in (start, depart, arrive)], axis=0)
     least = np.maximum(0.0, _END_SHARE * ends)
@@ -203,20 +222,25 @@ def _planned(
         # Not claimed to be clear: the density bends around what blocks it, or gets stuck there.
         ends = np.stack([depart, arrive])
         path = GuidePath(ends, is_clear=False, found_by=ALONE)
-        return PlannedPath(path, kept, 0.0)
+        return PlannedPath(path, kept, 0.0, goal, way_cost(arm, ends))
     began = time.perf_counter()
+
+    def found(path: GuidePath, kept: Array) -> PlannedPath:
+        cost = way_cost(arm, path.waypoints)
+        return PlannedPath(path, kept, time.perf_counter() - began, goal, cost)
+
     if not isinstance(guide, str):
         path = _checked(arm, guide.plan(depart, arrive, seed), depart, arrive)
         if path.is_clear:
             kept = _kept_along(check, path.waypoints, kept)
-        return PlannedPath(path, kept, time.perf_counter() - began)
+        return found(path, kept)
     stuck, remark = "", ""
     if guide != "path":
         space = SeparatingPlanes(world, margin, kept)
         answer = DensityGuide(legs, space, search).plan(depart, arrive, seed)
         if isinstance(answer, GuidePath):
             kept = _kept_along(check, answer.waypoints, kept)
-            return PlannedPath(answer, kept, time.perf_counter() - began)
+            return found(answer, kept)
         stuck, remark = answer.reason, answer.remark
         if guide == "density":
             raise PlanningError(Outcome.STUCK, stuck)
@@ -226,7 +250,7 @@ def _planned(
         also = f"; the density alone is stuck: {stuck}" if stuck else ""
         raise PlanningError(error.outcome, error.detail + also) from None
     path = replace(path, stuck=stuck, remark=remark)
-    return PlannedPath(path, kept, time.perf_counter() - began)
+    return found(path, kept)
 
 
 def _searched(

@@ -45,6 +45,8 @@ class Drive:
     """What the controller tracks, if it does."""
     path: GuidePath | None = None
     """The sub-goals that a guide found, if it has one."""
+    goal: Array | None = None
+    """The configuration that it leads to (nq,); None for the scenario's."""
 
 
 Baseline = Callable[[Scenario], Drive]
@@ -113,6 +115,8 @@ def run_by(
         return replace(ended, plan_time=time.perf_counter() - began if searched else 0.0)
     elapsed = time.perf_counter() - began
     told = scenario.disturbances if plant is None else None
+    if drive.goal is not None:
+        task = replace(task, goal=drive.goal)
     done = simulate_task(task, world, drive.controller, plant, told, on_progress)
     if done.outcome == Outcome.INFEASIBLE:
         return done
@@ -140,6 +144,8 @@ def by_density(
     """
     world = world or scenario.world
     drive = _plan(scenario, world, scenario.start, guide)
+    goal = scenario.goal if drive.goal is None else drive.goal
+    scenario = replace(scenario, goal=goal, goals=()) if scenario.goals else scenario
     is_told_velocity = scenario.control.form == ControlForm.VELOCITY
     if not replans or is_told_velocity or (guide is None and scenario.control.guide == "direct"):
         return drive
@@ -152,7 +158,7 @@ def by_density(
 
     controller = Replanning(
         scenario.arm,
-        scenario.goal,
+        goal,
         drive.controller,
         plan_again,
         patience=0.5 * scenario.simulation.stall_time,
@@ -164,7 +170,8 @@ def by_density(
 
 def _plan(scenario: Scenario, world: World, start: Array, guide: Guide | None) -> Drive:
     control, period = scenario.control, scenario.simulation.control_period
-    goal, chosen = scenario.goal, control.guide if guide is None else guide
+    chosen = control.guide if guide is None else guide
+    goal: Any = list(scenario.goals) or scenario.goal
     search: dict[str, Any] = {
         "margin": control.margin,
         "seed": scenario.seed,
@@ -178,7 +185,7 @@ def _plan(scenario: Scenario, world: World, start: Array, guide: Guide | None) -
         is_plain = control.form == ControlForm.PLAIN
         regulation = DensityRegulation(
             world,
-            goal,
+            planned.goal,
             path=planned.path,
             plain=is_plain,
             margin=control.margin,
@@ -189,7 +196,7 @@ def _plan(scenario: Scenario, world: World, start: Array, guide: Guide | None) -
             speed=scenario.speed,
             **law,
         )
-        return Drive(regulation, planned.plan_time, path=planned.path)
+        return Drive(regulation, planned.plan_time, path=planned.path, goal=planned.goal)
     try:
         motion = plan_motion(
             world,
@@ -214,7 +221,7 @@ def _plan(scenario: Scenario, world: World, start: Array, guide: Guide | None) -
         actuation=scenario.actuation,
         **law,
     )
-    return Drive(tracking, motion.plan_time, motion, motion.path)
+    return Drive(tracking, motion.plan_time, motion, motion.path, motion.goal)
 
 
 def records(run: Run) -> tuple[EnergyRecord, RantzerRecord]:

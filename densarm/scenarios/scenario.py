@@ -1,6 +1,6 @@
 """Scenario: robot, scene, start, goal and parameters of one run, from TOML or JSON."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from enum import StrEnum
 from functools import cached_property
@@ -11,7 +11,9 @@ import numpy as np
 
 from densarm.arms.arm import Arm, load_arm
 from densarm.arms.catalogue import scenario_paths
+from densarm.arms.description import own_frames
 from densarm.arms.joint_space import sliding_joints
+from densarm.arms.pose import Pose
 from densarm.certificates.task import PLANTS, Input, SimulationParameters, Task
 from densarm.control.controller import Gains
 from densarm.control.disturbance_observer import ActuationParameters
@@ -22,6 +24,7 @@ from densarm.density.goal_distance import KAPPA_MIN, TorusDistance, joint_weight
 from densarm.density.navigation_density import DensityParameters
 from densarm.density.unsafe_sets import SensingParameters
 from densarm.errors import DensarmError, FileContentError, InvalidValueError, UnknownNameError
+from densarm.planning.goals import candidates, goal_list
 from densarm.planning.guide import PlanningParameters
 from densarm.planning.motion import TimingParameters
 from densarm.planning.plan import GUIDES, PATH_MARGIN, PLANNING_ALPHA
@@ -39,6 +42,7 @@ from densarm.values.checks import (
 from densarm.values.documented import documented
 from densarm.values.files import read_toml
 from densarm.values.tables import parse_table
+from densarm.world.swept_check import SweptCheck
 from densarm.world.world import World
 
 
@@ -93,6 +97,7 @@ class Scenario:
     """Everything that determines a run.
 
     Raises:
+        PlanningError: a goal that is no configuration and out of reach, or in collision.
         InvalidValueError: start or goal is not a configuration, the seed is not a whole number,
             weights are not one per joint, the density gives no feedback that settles at a goal, or
             a plant that velocities cannot drive, or disturbances of another arm.
@@ -110,7 +115,7 @@ class Scenario:
     start: Array
     """Configuration at the start (nq,); `Arm.configuration` makes one from joint positions."""
     goal: Array
-    """Configuration to reach (nq,)."""
+    """Configuration to reach (nq,); it may be given as a `Goal`, and is the nearest of it then."""
     control: ControlParameters = field(default_factory=ControlParameters)
     """Guide, form of control and safety margin."""
     density: DensityParameters = field(default_factory=DensityParameters)
@@ -135,12 +140,22 @@ class Scenario:
     """How it differs from the model."""
     seed: int = 0
     """Seed of every random choice."""
+    goals: Sequence[Array | Pose] = ()
+    """What `goal` was chosen from, of which any will do: a plan chooses again."""
 
     def __post_init__(self) -> None:
-        for key in ("start", "goal"):
-            q = self.arm.check_configuration(f"{key} configuration", getattr(self, key))
-            object.__setattr__(self, key, q)
         non_negative_integer("seed", self.seed)
+        start = self.arm.check_configuration("start configuration", self.start)
+        object.__setattr__(self, "start", start)
+        goals = goal_list(self.arm, self.goal, "goal configuration")
+        if len(goals) > 1 or isinstance(goals[0], Pose):
+            object.__setattr__(self, "goals", tuple(goals))
+            check, solutions = SweptCheck(self.world, self.control.margin), self.planning.solutions
+            margin = self.control.path_margin
+            ranked = candidates(check, start, goals, self.seed, solutions, margin)
+            object.__setattr__(self, "goal", ranked[0].q)
+        else:
+            object.__setattr__(self, "goal", goals[0])
         self.disturbances.require_fit(self.arm)
         one_of("plant", self.plant, PLANTS)
         joint_weights("density.weights", self.arm, self.density.weights)
@@ -183,6 +198,7 @@ class Scenario:
             disturbances=self.disturbances.given,
             settings={
                 "seed": self.seed,
+                **({"goals": _goals_json(self.arm, self.goals)} if self.goals else {}),
                 **{key: asdict(getattr(self, key)) for key in _SETTINGS},
                 "gains": asdict(self.law_gains),
             },
@@ -205,6 +221,7 @@ class Scenario:
         return cls(
             **{key: getattr(task, key) for key in _SHARED},
             seed=settings.get("seed", 0),
+            goals=tuple(_one_goal(task.arm, "goals", item) for item in settings.get("goals", ())),
             disturbances=parse_table("disturbances", Disturbances, task.disturbances),
             **{
                 key: parse_table(key, TABLES[key], tables.get(key, {}))
@@ -272,7 +289,7 @@ def _parse(path: Path, data: dict[str, Any]) -> Scenario:
         arm=arm,
         scene=Scene(scene),
         start=_configuration(arm, "task.start", task.start),
-        goal=_configuration(arm, "task.goal", task.goal),
+        goal=_goal(arm, "task.goal", task.goal),
         plant=data.get("plant", PLANTS[0]),
         seed=data.get("seed", 0),
         **{
@@ -297,6 +314,7 @@ class _RobotTable:
     torque_rate: tuple[float, ...] | float | None = None
     jerk: tuple[float, ...] | float | None = None
     armature: tuple[float, ...] | float | None = None
+    frames: dict[str, Any] = field(default_factory=dict)
     shapes: str | None = None
     collision_from_visual: str | None = None
     inertia: str | None = None
@@ -306,7 +324,7 @@ class _RobotTable:
 @dataclass(frozen=True)
 class _TaskTable:
     start: str | tuple[float, ...] = ()
-    goal: str | tuple[float, ...] = ()
+    goal: Any = field(default_factory=list)
 
 
 def _parse_robot(folder: Path, table: _RobotTable) -> Arm:
@@ -315,17 +333,49 @@ def _parse_robot(folder: Path, table: _RobotTable) -> Arm:
     if bool(name) == bool(urdf):
         allowed = "a table with either name or urdf"
         raise InvalidValueError("robot", {"name": name, "urdf": urdf}, allowed)
-    placement = given.pop("base_placement")
+    placement, frames = given.pop("base_placement"), own_frames(given.pop("frames"))
     arm = load_arm(
         name or folder / urdf,
         srdf=folder / srdf if srdf else None,
         package_dirs=[folder / item for item in folders],
+        frames=frames,
         **given,
     )
     return arm if placement is None else Arm(replace(arm.description, base_placement=placement))
 
 
-def _configuration(arm: Arm, key: str, value: str | tuple[float, ...]) -> Array:
+def with_goal(scenario: Scenario, key: str, value: Any) -> Scenario:
+    """Return a scenario with a goal as files have it; errors call it by the key."""
+    return replace(scenario, goal=_goal(scenario.arm, key, value), goals=())
+
+
+def _goal(arm: Arm, key: str, value: Any) -> Any:
+    """Return the goal of a value of TOML or JSON: positions, a posture, a pose, or a list of them.
+
+    Raises:
+        DensarmError: as `Pose.of_table`, or a value that is none.
+    """
+    is_list = isinstance(value, list) and not all(isinstance(x, int | float) for x in value)
+    if not is_list:
+        return _one_goal(arm, key, value)
+    return [_one_goal(arm, f"{key}[{k}]", item) for k, item in enumerate(value)]
+
+
+def _one_goal(arm: Arm, key: str, value: Any) -> Array | Pose:
+    if isinstance(value, Mapping):
+        return Pose.of_table(key, value)
+    if not isinstance(value, str | list):
+        raise InvalidValueError(
+            key, value, "joint positions, a posture, a pose, or a list of these"
+        )
+    return _configuration(arm, key, value)
+
+
+def _goals_json(arm: Arm, goals: Sequence[Array | Pose]) -> list[Any]:
+    return [x.to_json() if isinstance(x, Pose) else arm.angles(x).tolist() for x in goals]
+
+
+def _configuration(arm: Arm, key: str, value: str | Sequence[float]) -> Array:
     if isinstance(value, str):
         if value not in arm.postures:
             raise UnknownNameError(f"posture for {key}", value, arm.postures)

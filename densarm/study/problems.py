@@ -23,11 +23,14 @@ from densarm.scenarios.scenario import ControlParameters, Scenario
 from densarm.scene.loading import MotionProblem
 from densarm.simulation.disturbances import Disturbances
 from densarm.simulation.run import Run
-from densarm.values.checks import positive_integer
+from densarm.values.checks import one_of, positive_integer
 from densarm.values.outcome import FAILED, RUN_ENDS, Outcome
 from densarm.values.tables import parse_table
 
 PERCENTILES = (50, 95, 98)
+
+GOALS = ("configuration", "pose")
+"""What of a problem's goal is asked for: all of it, or where the end effector is there."""
 
 MEASURES = (
     "plan_time_s",
@@ -205,6 +208,7 @@ def run_problem(
     plant: str = PLANTS[0],
     disturb: Mapping[str, Any] = MappingProxyType({}),
     draw: Mapping[str, float] = MappingProxyType({}),
+    goals: str = GOALS[0],
 ) -> ProblemResult:
     """Plan a problem, run its closed loop and prove it; an error becomes a result.
 
@@ -218,10 +222,11 @@ def run_problem(
         plant: what is driven, "pinocchio" or "mujoco".
         disturb: how it differs from the model, as the keys of a table ``[disturbances]``.
         draw: what of this is drawn, as `drawn` does it.
+        goals: one of `GOALS`.
     """
 
     def run() -> Run:
-        scenario = scenario_of(problem, seed)
+        scenario = scenario_of(problem, seed, goals)
         told = {**disturb, **drawn(draw, problem, seed, scenario.arm.nv)}
         scenario = replace(
             scenario,
@@ -237,7 +242,8 @@ def run_problem(
             done.save(file)
             return done
         recorded = Run.load(file)
-        if recorded.task.to_json() != scenario.task.to_json():
+        reached = recorded.task.goal if scenario.goals else scenario.goal
+        if recorded.task.to_json() != replace(scenario.task, goal=reached).to_json():
             raise FileContentError(file, "the record of another problem: remove it, or its folder")
         return recorded
 
@@ -284,8 +290,13 @@ def problem_result(
         return ProblemResult(scene, index, FAILED, str(error))
 
 
-def scenario_of(problem: MotionProblem, seed: int = 0) -> Scenario:
+def scenario_of(problem: MotionProblem, seed: int = 0, goals: str = GOALS[0]) -> Scenario:
     """Return a problem of a known robot as a scenario with default parameters.
+
+    Args:
+        problem: of a known robot.
+        seed: of the planner.
+        goals: one of `GOALS`: the problem's goal, or the end effector's pose there.
 
     Raises:
         UnknownNameError: no such robot, or joint to lock.
@@ -297,13 +308,15 @@ def scenario_of(problem: MotionProblem, seed: int = 0) -> Scenario:
         raise InvalidValueError("metadata.joints", list(problem.joints), allowed)
     order = [problem.joints.index(name) for name in arm.joint_names]
     name = f"{problem.robot}_{problem.scene_name}_{problem.index}"
+    goal = arm.configuration([problem.goal[k] for k in order])
+    wanted: Any = goal if one_of("goals", goals, GOALS) == GOALS[0] else arm.pose(goal)
     return Scenario(
         name=name,
         title=name,
         arm=arm,
         scene=problem.scene,
         start=arm.configuration([problem.start[k] for k in order]),
-        goal=arm.configuration([problem.goal[k] for k in order]),
+        goal=wanted,
         seed=seed,
     )
 

@@ -1,6 +1,6 @@
 """A render scene, drawn by meshcat's commands."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import meshcat
@@ -9,6 +9,7 @@ import meshcat.geometry
 import numpy as np
 import pinocchio as pin
 
+from densarm.arms.pose import Pose
 from densarm.values.arrays import Array
 from densarm.visualization import palette
 from densarm.visualization.bodies import Body, sensing_bodies
@@ -19,6 +20,7 @@ from densarm.visualization.triangle_mesh import TriangleMesh
 
 _SKY, _HORIZON = [1.0, 1.0, 1.0], [0.86, 0.89, 0.92]
 _LIGHTS = {"AmbientLight": 0.5, "FillLight": 0.3}  # meshcat's own values bleach light colours
+_AXES = 25.0  # length of a goal's axes, in radii of the path
 _GOAL_LOOK = {
     "color": hexadecimal(palette.GOAL),
     "opacity": palette.GOAL_OPACITY,
@@ -59,6 +61,7 @@ def draw(scene: RenderScene, viewer: meshcat.Visualizer) -> None:
     _draw_arm(viewer["robot"], scene, meshes, scene.q[0])
     if (goal := scene.run.task.goal) is not None:
         _draw_arm(viewer["goal"], scene, meshes, goal, _GOAL_LOOK)
+    _draw_poses(viewer["goal"], scene)
     _draw_obstacles(viewer, scene)
     if scene.path is not None:
         look = meshcat.geometry.MeshBasicMaterial(vertexColors=True)
@@ -83,6 +86,21 @@ def _draw_arm(
         _draw_body(node[scene.joints[body.joint]][body.name], body, mesh, **(look or own_look))
     for name, pose in zip(scene.joints, scene.joint_poses(q), strict=True):
         node[name].set_transform(pose.homogeneous)
+
+
+def _draw_poses(node: meshcat.Visualizer, scene: RenderScene) -> None:
+    """Draw the poses that a scenario has for goals: axes, or where a position is all, a ball."""
+    tables = scene.run.task.settings.get("goals", ())
+    for k, table in enumerate(table for table in tables if isinstance(table, Mapping)):
+        pose, size = Pose.of_table("goal", table), _AXES * scene.line_radius
+        placement = pose.placement
+        placement.translation -= scene.run.task.arm.origin
+        if pose.orientation_xyzw is None:
+            look = meshcat.geometry.MeshPhongMaterial(color=hexadecimal(palette.GOAL))
+            node[f"pose_{k}"].set_object(meshcat.geometry.Sphere(0.1 * size), look)
+        else:
+            node[f"pose_{k}"].set_object(meshcat.geometry.triad(size))
+        node[f"pose_{k}"].set_transform(placement.homogeneous)
 
 
 def _draw_body(

@@ -13,7 +13,7 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from densarm.arms.arm import Arm
-from densarm.arms.joint_space import joint_axis
+from densarm.arms.joint_space import compose, joint_rows, place_joints, pose_row
 from densarm.scene.shapes import box_hull, convex_hull, extreme_points
 from densarm.values.arrays import Array
 from densarm.values.kernels import compiled_part
@@ -30,8 +30,7 @@ class Bodies(NamedTuple):
     parent: Integers
     """Joint that each joint moves with (njoints,)."""
     joints: Array
-    """One row for each joint (njoints, 16): its pose at rest in its parent's frame, the unit vector
-    along which it slides or about which it turns, and 1 if it slides, else 0."""
+    """`joint_rows` of the arm's model (njoints, 16)."""
     joint: Integers
     """Joint that moves each body (S,)."""
     shapes: Array
@@ -89,7 +88,7 @@ def _bodies(world: World) -> tuple[Bodies, Integers]:
     middles = 0.5 * (low + high)
     centred = [each - middle for each, middle in zip(corners, middles, strict=True)]
     frames = [
-        _pose_row(_pose(item) * pin.SE3(np.eye(3), middle))
+        pose_row(_pose(item) * pin.SE3(np.eye(3), middle))
         for item, middle in zip(shapes, middles, strict=True)
     ]
     reach = np.array([np.linalg.norm(each, axis=1).max() for each in centred]) + radius
@@ -100,14 +99,9 @@ def _bodies(world: World) -> tuple[Bodies, Integers]:
     last = np.array(shared, dtype=np.int64)
     is_first = joint[world.pair_shapes[:, :1]] == last[:, np.newaxis]
     pairs = np.where(is_first, world.pair_shapes[:, ::-1], world.pair_shapes)
-    joints = np.zeros((model.njoints, 16))
-    for index, placement in enumerate(model.jointPlacements):
-        joints[index, :12] = _pose_row(placement)
-        if index > 0:
-            joints[index, 12:15], joints[index, 15] = joint_axis(model, index)
     bodies = Bodies(
         parent=np.array(list(model.parents), dtype=np.int64),
-        joints=joints,
+        joints=joint_rows(model),
         joint=joint,
         shapes=np.column_stack([np.array(frames), box, reach, radius, world.shape_lipschitz]),
         points=np.vstack(centred),
@@ -155,10 +149,6 @@ def _edges(neighbours: list[_Neighbours], first: Integers) -> Integers:
     return np.concatenate([ends, *others]).astype(np.int64)
 
 
-def _pose_row(placement: pin.SE3) -> Array:
-    return np.concatenate([placement.rotation.ravel(), placement.translation])
-
-
 @compiled_part
 def place(
     bodies: Bodies,
@@ -179,42 +169,11 @@ def place(
         is_asked: which bodies are to be placed (S,).
         joint_pose: poses of the joints in the world (njoints, 12), overwritten.
         pose: poses of the bodies (S, 12), overwritten.
-
-    Source: Rodrigues' formula: Lynch and Park, Modern Robotics, eq. 3.51.
     """
-    joints = bodies.joints
-    for k in range(12):
-        joint_pose[0, k] = 1.0 if k in (0, 4, 8) else 0.0
-    for joint in range(1, bodies.parent.size):
-        row = joint_pose[joint]
-        _compose(joint_pose[bodies.parent[joint]], joints[joint], row)
-        x, y, z = joints[joint, 12], joints[joint, 13], joints[joint, 14]
-        position = angles[joint - 1] + share * step[joint - 1]
-        slide = position * joints[joint, 15]
-        turn = position - slide
-        c, s = math.cos(turn), math.sin(turn)
-        for i in range(0, 9, 3):
-            a, b, d = row[i], row[i + 1], row[i + 2]
-            along = a * x + b * y + d * z
-            row[9 + i // 3] += slide * along
-            along *= 1.0 - c
-            row[i] = c * a + s * (b * z - d * y) + along * x
-            row[i + 1] = c * b + s * (d * x - a * z) + along * y
-            row[i + 2] = c * d + s * (a * y - b * x) + along * z
+    place_joints(bodies.parent, bodies.joints, angles, step, share, joint_pose)
     for body in range(bodies.joint.size):
         if is_asked[body]:
-            _compose(joint_pose[bodies.joint[body]], bodies.shapes[body], pose[body])
-
-
-@compiled_part
-def _compose(outer: Array, inner: Array, out: Array) -> None:
-    """Write a pose that is given in the frame of another, both rows of 12 or more numbers."""
-    for r in range(3):
-        a, b, c = outer[3 * r], outer[3 * r + 1], outer[3 * r + 2]
-        for column in range(3):
-            turned = a * inner[column] + b * inner[3 + column]
-            out[3 * r + column] = turned + c * inner[6 + column]
-        out[9 + r] = outer[9 + r] + (a * inner[9] + b * inner[10] + c * inner[11])
+            compose(joint_pose[bodies.joint[body]], bodies.shapes[body], pose[body])
 
 
 @compiled_part

@@ -6,6 +6,7 @@ import numpy as np
 
 from densarm.arms.arm import Arm
 from densarm.arms.dynamics import holding_ratios, holding_torque
+from densarm.arms.joint_space import sliding_joints
 from densarm.arms.joints import POSITION_TOLERANCE
 from densarm.errors import DensarmError
 from densarm.values.arrays import Array
@@ -71,11 +72,13 @@ def clear_configurations(world: World, count: int, seed: int, margin: float = 0.
 
 
 def _limit_faults(arm: Arm, q: Array) -> Iterator[str]:
-    limits, angles = arm.limits, arm.angles(q)
+    limits, angles, turns = arm.limits, arm.angles(q), ~sliding_joints(arm.model)
     for j in np.flatnonzero(limits.excess(angles) > POSITION_TOLERANCE):
         # Digits enough to tell a position from the limit that it exceeds by the tolerance.
         allowed = f"[{limits.lower[j]:.12g}, {limits.upper[j]:.12g}]"
-        yield f"joint {arm.joint_names[j]!r} at {angles[j]:.12g} is outside {allowed}"
+        asked = turns[j] and abs(angles[j]) > 2.0 * np.pi
+        hint = ": are these degrees?" if asked else ""
+        yield f"joint {arm.joint_names[j]!r} at {angles[j]:.12g} is outside {allowed}{hint}"
 
 
 def _holding_faults(arm: Arm, q: Array) -> Iterator[str]:

@@ -10,10 +10,14 @@ import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 
 from densarm.arms.arm import Arm
-from densarm.errors import InvalidValueError
+from densarm.arms.dynamics import holding_ratios, holding_torque
+from densarm.arms.inverse_kinematics import InverseKinematics
+from densarm.arms.pose import Pose
+from densarm.errors import DensarmError, InvalidValueError
 from densarm.scene.obstacles import Obstacle, geometry_objects
 from densarm.scene.scene import Scene
 from densarm.values.arrays import Array
+from densarm.values.checks import non_negative, non_negative_integer, positive_integer
 from densarm.values.documented import documented
 from densarm.world.distance_view import add_pair_gradients, pair_rates
 from densarm.world.lipschitz import joint_support, shape_lipschitz
@@ -27,6 +31,9 @@ Above it the largest error measured, between hulls with faces nearly parallel, i
 """
 
 _OVERLAP = 5e-3  # [m], above which a base does not just stand on something; UR's meshes go 3 mm in
+
+_ENOUGH = 6  # times as many solutions as are asked for, after which no more are looked for
+_APART = 0.1  # [rad or m] of some joint, between two ways to reach a pose
 
 Pairs = NDArray[np.int64]
 """Indices of pairs (P,)."""
@@ -171,6 +178,83 @@ class World(ChangingObstacles):
         k = int(distance.argmin())
         points = self._queries.rows[k, 4:].reshape(2, 3) + self.arm.origin
         return NearestPair(float(distance[k]), points, self.pairs[k])
+
+    def inverse_kinematics(
+        self,
+        pose: Pose,
+        count: int = 8,
+        seed: int = 0,
+        *,
+        near: ArrayLike | None = None,
+        margin: float = 0.0,
+    ) -> Array:
+        """Return configurations that take a frame to a pose: clear, inside limits, nearest first.
+
+        Obstacles are where they are now. Of an arm with more joints than the pose needs, ways of
+        which one leads into another count as several where a joint differs by more than 0.1.
+
+        Args:
+            pose: where a frame shall be.
+            count: configurations at most.
+            seed: of the starts of the search; the same gives the same bits.
+            near: configuration (nq,) to be near to, at which the search begins; None for the
+                neutral one.
+            margin: distance that every pair must exceed [m].
+
+        Returns:
+            Configurations (N, nq), 1 <= N <= count, at which the arm can be held too.
+
+        Raises:
+            UnknownNameError: no such frame.
+            DensarmError: the pose is out of reach, or in collision, with how far and what.
+        """
+        arm, limits = self.arm, self.arm.limits
+        if not isinstance(pose, Pose):
+            raise InvalidValueError("pose", pose, "a densarm.Pose")
+        if near is None:
+            neutral = arm.configurations(np.clip(0.0, limits.lower, limits.upper))
+            near = arm.postures.get("neutral", neutral)
+        near = arm.check_configuration("near", near)
+        non_negative("margin", margin)
+        search = InverseKinematics(arm, pose)
+        tried, found = np.empty((0, arm.nq)), list[Array]()
+        enough = _ENOUGH * positive_integer("count", count)
+        for used, ways in enumerate(search.solutions(near, non_negative_integer("seed", seed))):
+            for q in ways:
+                if (np.abs(arm.difference(tried, q)).max(axis=1) < _APART).any():
+                    continue
+                tried = np.vstack([tried, q])
+                if self._keeps(q, margin) and holding_ratios(arm, q).max() <= 1.0:
+                    found.append(q)
+                    break
+            if len(found) == count or (found and used > enough):
+                break
+        if not found:
+            reason = self._fault(tried, margin) if len(tried) else search.shortfall()
+            raise DensarmError(f"pose of {pose} {reason}")
+        solutions = np.array(found)
+        far = np.linalg.norm(arm.difference(near, solutions), axis=1)
+        return np.asarray(solutions[np.argsort(far, kind="stable")])
+
+    def _keeps(self, q: Array, margin: float) -> bool:
+        """Return whether all pairs are farther apart than a margin [m] at q (nq,)."""
+        if margin > 0.0 or not self.spare_is_known:
+            return bool(self.distances(q).min(initial=np.inf) > margin)
+        # Takes a quarter of the time that distances take.
+        model, data = self.geometry_model, self._geometry_data
+        return not pin.computeCollisions(self.arm.model, self._data, model, data, q, True)
+
+    def _fault(self, tried: Array, margin: float) -> str:
+        """Return, as a phrase, what is wrong at the best of configurations (N, nq)."""
+        distances = np.array([self.distances(q) for q in tried]).reshape(len(tried), -1)
+        least = distances.min(axis=1, initial=np.inf)
+        best = int(least.argmax())
+        gap, ways = 1e3 * float(least[best]), f"all {len(tried)} ways to reach it that were tried"
+        if gap > 1e3 * margin:
+            return f"cannot be held: {holding_torque(self.arm, tried[best])}"
+        pair = " and ".join(self.pairs[int(distances[best].argmin())])
+        how = f"overlap by {-gap:.3g} mm" if gap <= 0.0 else f"are {gap:.3g} mm apart"
+        return f"is in collision in {ways}; where least {pair} {how}"
 
     def base_overlaps(self) -> tuple[str, ...]:
         """Return what the function of this name does, of the obstacles as they are now."""

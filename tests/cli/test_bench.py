@@ -117,6 +117,22 @@ def test_collection_is_run_and_kept(
     assert (again.status, again.out) == (0, done.out)
 
 
+def test_poses_may_be_the_goals(
+    command: Command, collection: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    runs = tmp_path / "runs"
+    arguments = ["bench", "motionbenchmaker", "--problems", collection, "--save-dir", runs]
+    done = command(*arguments, "--goals", "pose")
+    assert (done.status, done.err) == (0, "")
+    run = Run.load(runs / "empty_3.npz")
+    assert run.outcome == "reached"
+    pose, reached = run.task.settings["goals"][0], run.task.arm.pose(run.q[-1])
+    np.testing.assert_allclose(reached.position, pose["position"], atol=0.01)
+    monkeypatch.setattr("densarm.study.problems.run_scenario", None)
+    assert command(*arguments, "--goals", "pose").out == done.out
+    assert "another problem" in command(*arguments).out
+
+
 def test_record_of_another_problem_is_not_taken(
     command: Command, collection: Path, tmp_path: Path
 ) -> None:
@@ -163,3 +179,17 @@ def test_moving_refuses_an_unknown_method(command: Command) -> None:
     assert done.status == 2
     assert done.err.count("\n") == 1
     assert "density" in done.err
+
+
+def test_inverse_kinematics_reports_its_keys(command: Command, tmp_path: Path) -> None:
+    path = tmp_path / "ik.json"
+    done = command("bench", "ik", "two_link", "swing_up", "--poses", 4, "--json", path)
+    assert (done.status, done.err) == (0, "")
+    results = json.loads(path.read_text(encoding="utf-8"))["results"]
+    assert [result["asked"] for result in results][:2] == ["position", "free about x"]
+    assert all(result["found"] == result["total"] == 4 for result in results)
+    assert all(0.0 < result["median_ms"] <= result["longest_ms"] for result in results)
+    assert "swing_up" in done.out
+    refused = command("bench", "ik", "pandda")
+    assert refused.status == 2
+    assert "did you mean 'panda'?" in refused.err

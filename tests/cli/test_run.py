@@ -259,3 +259,20 @@ def test_a_disturbed_arm_in_mujoco(
     data = json.loads(path.read_text(encoding="utf-8"))
     assert data["plant"] == "mujoco"
     assert data["disturbances"] == {"mass_scale": [1.0, 1.02], "coulomb": 0.01}
+
+
+def test_a_goal_may_be_given_in_place_of_the_scenarios(
+    command: Command, scenario_file: Callable[..., Path]
+) -> None:
+    path = scenario_file()
+    assert "reached" in command("run", path, "--goal", "[0.1, 0.0]").out
+    assert "reached" in command("run", path, "--goal", "hanging").out
+    for goal, expected in (
+        ("hung", "unknown posture for --goal 'hung'"),
+        ("[0.1, 0.0", "'--goal': '[0.1, 0.0': not as in TOML"),
+        ('{frame = "hand", position = [0, 0, 1]}', "unknown frame 'hand'"),
+    ):
+        done = command("run", path, "--goal", goal)
+        assert done.status == 2
+        assert expected in done.err
+        assert done.err.count("\n") == 1

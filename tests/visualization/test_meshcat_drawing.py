@@ -1,4 +1,5 @@
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import meshcat
@@ -8,6 +9,7 @@ import pytest
 
 from densarm.arms.arm import Arm
 from densarm.arms.description import RobotDescription
+from densarm.arms.pose import Pose
 from densarm.scene.motion import BackAndForth
 from densarm.scene.obstacles import Capsule, Sphere
 from densarm.scene.scene import Scene
@@ -148,3 +150,17 @@ def test_obstacles_move_along(two_link: Arm, record: Callable[..., Run]) -> None
     pictures = [Picture(shown, 320, 180).frame(k) for k in (0, len(shown.time) - 1)]
     below = [np.asarray(image, dtype=int)[40:-40] for image in pictures]
     assert (np.abs(below[0] - below[1]).max(axis=2) > 8).sum() > 200
+
+
+def test_poses_that_are_goals_have_axes_or_a_ball(swing: Run) -> None:
+    whole = Pose("link2", [0.1, 0.0, 0.5], [0.0, 1.0, 0.0, 0.0])
+    goals = [whole.to_json(), Pose("link2", [0.3, 0.0, 0.5]).to_json(), [0.0, 0.0]]
+    task = replace(swing.task, settings={**swing.task.settings, "goals": goals})
+    window = drawn(RenderScene(replace(swing, task=task)))
+    drawings = window.of_type("set_object")
+    (axes,) = [path for path in drawings if path.endswith("goal/pose_0")]
+    np.testing.assert_allclose(window.place(axes), whole.placement.homogeneous, atol=1e-12)
+    assert drawings[axes]["object"]["object"]["type"] == "LineSegments"
+    (ball,) = [path for path in drawings if path.endswith("goal/pose_1")]
+    np.testing.assert_allclose(window.place(ball)[:3, 3], [0.3, 0.0, 0.5])
+    assert not any(path.endswith("pose_2") for path in drawings)
