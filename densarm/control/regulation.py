@@ -78,6 +78,7 @@ class FieldRegulation:
         evasion: Evasion | None = None,
     ) -> None:
         self._arm, self._evasion = arm, evasion
+        self.is_evading = False
         self._field = field
         self._speed_law = speed_law
         self._gain = gains.velocity
@@ -106,8 +107,8 @@ class FieldRegulation:
         metric = self._scale * self._dynamics.mass_matrix() if self._scale > 0.0 else None
         velocity = self._limited(q, metric)
         if self._evasion is not None and self._evasion.is_needed():
-            evading, gives_way = self._evasion.velocity(q, v, velocity)
-            if gives_way:
+            evading, self.is_evading = self._evasion.velocity(q, v, velocity)
+            if self.is_evading:
                 self._evasion.send_torque(self._dynamics, evading)
                 return np.array(self._dynamics.rows[TORQUE])
         wanted = self._dynamics.torque(-self._gain * v, self._gain * velocity)
@@ -169,6 +170,7 @@ class DensityRegulation(FieldRegulation):
 
     Attributes:
         goal: as given (nq,), or where it has moved to.
+        is_evading: whether the arm gave way to what moves at the last call.
 
     Raises:
         InvalidValueError: a goal that touches something or is outside limits, or a density that is

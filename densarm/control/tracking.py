@@ -103,6 +103,7 @@ class DensityTracking:
         motion: as given.
         goal: where it ends (nq,).
         tracking_error: largest |e| of a joint at the last call, zero before the first [rad or m].
+        is_evading: whether the arm gave way to what moves at the last call, or still returns.
 
     Raises:
         InvalidValueError: a density that is singular, flat or blended at e = 0.
@@ -128,6 +129,7 @@ class DensityTracking:
         self.motion = motion
         self.goal: Array = arm.configurations(motion.position[-1])
         self.tracking_error: float = 0.0
+        self.is_evading = False
         self._arm = arm
         self._kinematics = Kinematics(arm)
         distance = goal_distance or TorusDistance(arm)
@@ -141,7 +143,7 @@ class DensityTracking:
             self.velocity(0.0, self.goal, np.zeros(arm.nv))
             return
         unlimited = np.full(arm.nv, math.inf)
-        self._evasion, self._is_evading = evasion(world, pairs.pairs, motion.margin), False
+        self._evasion = evasion(world, pairs.pairs, motion.margin)
         self._dynamics = InverseDynamics(arm, unlimited, self._kinematics, motion.period, actuation)
         kappa = distance.kappa if isinstance(distance, TorusDistance) else math.nan
         constants = motion.period, actuation.delay, kappa, gains.position, gains.velocity
@@ -209,8 +211,8 @@ class DensityTracking:
         wanted, gives_way = self._evasion.velocity(q, v, follow - back)
         is_off = off.max() > _HANDED_OVER[0] or np.abs(v - follow).max() > _HANDED_OVER[1]
         is_off |= self.is_moving and abs(1.0 - numbers[_RATE]) > _HANDED_OVER[1]
-        self._is_evading = gives_way or (self._is_evading and bool(is_off))
-        if self._is_evading:
+        self.is_evading = gives_way or (self.is_evading and bool(is_off))
+        if self.is_evading:
             numbers[_EMERGENCY] = 0.0
             rows[RATE_LIMIT] = numbers[_ELAPSED] * self._arm.limits.torque_rate
             ahead = 0.0 if gives_way else rows[BRAKE]
