@@ -15,7 +15,7 @@ from densarm.values.arrays import Array
 from densarm.values.checks import non_negative, positive
 from densarm.values.documented import documented
 from densarm.values.kernels import compiled, compiled_part
-from densarm.world.active_pairs import ActivePairs, pair_motion
+from densarm.world.active_pairs import ActivePairs
 from densarm.world.distance_view import add_pair_gradient, pair_rate
 from densarm.world.pair_queries import PairQueries
 from densarm.world.stopping import HELD_SHARE
@@ -110,37 +110,44 @@ class Evasion:
         arm, p, self._margin = world.arm, parameters, margin
         self._world, self._arm, self._pairs, self.parameters = world, arm, pairs, p
         self._version, self._way_before = 0, world.obstacle_way.copy()
-        self._is_moving = np.zeros(world.n_pairs, bool)
-        self._is_needed = False
+        self._is_moving, self._is_needed = np.zeros(world.n_pairs, bool), False
+        self._ahead = np.array([margin + p.margin + p.distance, p.reaction + p.horizon])
         n, size = arm.nv, (_TIMES + 1) * world.n_pairs
         # Blocks of rows of the density, and of misses at each time; how many in each; all in reach.
-        self._rows, self._chosen = np.zeros((size, n + 1)), np.zeros((size, n + 1))
-        self._count = np.zeros(_TIMES + 1, np.int64)
+        self._rows, self._count = np.zeros((size, n + 1)), np.zeros(_TIMES + 1, np.int64)
+        self._chosen, self._lower = np.zeros((size, n)), np.zeros(n + size)
         self._turn, self._looks = 0, False
         self._obstacle_of = world.pair_shapes[:, 1].tolist()
         self._near = np.zeros(world.n_pairs, np.int64)
-        self._hessian, self._upper = np.eye(n), np.full(size, _UNBOUNDED)
+        self._hessian, self._upper = np.eye(n), np.full(n + size, _UNBOUNDED)
         self._sense = np.where(np.arange(n + size) < n, 0, 8).astype(np.int32)  # soft beyond bounds
         self._data = arm.model.createData()
         self._jacobian = self._data.J.reshape(6, n)
         geometry = world.geometry_model
         self._queries = PairQueries(arm.model, geometry, world.pair_shapes, remembers=False)
+        self._poses = self._queries.data.oMg
+        self._places = [pose.translation for pose in self._poses]  # views
         limits, turns = arm.limits, arm.continuous
         lower, upper = np.where(turns, -np.inf, limits.lower), np.where(turns, np.inf, limits.upper)
         speed = _LIMIT_SHARE * np.minimum(limits.velocity, _FASTEST)
         self._limits = np.array([lower, upper, speed, _LIMIT_SHARE * limits.acceleration])
         self._density = np.array([margin, p.distance, p.decay, p.margin, p.reaction])
+        self._most, self._none = HELD_SHARE * limits.acceleration, np.zeros(n)
 
     def is_needed(self) -> bool:
         """Return whether any obstacle moves, or was moved; pairs are awake in time from then on."""
-        world, p = self._world, self.parameters
+        world = self._world
         if world.version != self._version:
             self._version = world.version
-            self._is_moving[:] = (world.obstacle_way != self._way_before) | world.has_motion
-            self._is_needed = bool(self._is_moving.any())
-            if self._is_needed:
-                ahead = np.array([self._margin + p.margin + p.distance, p.reaction + p.horizon])
-                _widen(self._pairs.reach, self._is_moving, world.twist, ahead)
+            self._is_needed = _note_moving(
+                self._is_moving,
+                world.has_motion,
+                world.obstacle_way,
+                self._way_before,
+                world.twist,
+                self._ahead,
+                self._pairs.reach,
+            )
         return self._is_needed
 
     def velocity(self, q: Array, v: Array, nominal: Array) -> tuple[Array, bool]:
@@ -151,36 +158,43 @@ class Evasion:
             v: velocity (nv,) [rad/s or m/s].
             nominal: q̇_nom (nv,), of which only what the bounds allow is returned.
         """
-        angles, n = self._arm.angles(q), self._arm.nv
-        low, high, wanted = _bounds(angles, v, nominal, self._limits)
+        angles, end = self._arm.angles(q), self._arm.nv
         self._write_rows(q, v, angles)
-        some, holds = _in_reach(self._rows, self._count, low, high, wanted, self._chosen)
+        low, high, wanted = self._lower[:end], self._upper[:end], np.empty(end)
+        some, holds = _choose(
+            angles,
+            v,
+            nominal,
+            self._limits,
+            self._rows,
+            self._count,
+            self._chosen,
+            self._lower,
+            high,
+            wanted,
+        )
         if holds:
             return wanted, False
-        slopes, bounds = self._chosen[:some, :n].copy(), self._chosen[:some, n]
+        end += some
         found, _, flag, _ = daqp.solve(
             self._hessian,
             -nominal,
-            slopes,
-            np.append(high, self._upper[:some]),
-            np.append(low, bounds),
-            self._sense[: n + some],
+            self._chosen[:some],
+            self._upper[:end],
+            self._lower[:end],
+            self._sense[:end],
             rho_soft=_SOFTNESS,
         )
         return (np.clip(found, low, high) if flag > 0 else np.clip(0.0, low, high)), True
 
     def send_torque(
-        self, dynamics: InverseDynamics, wanted: Array, ahead: Array | float = 0.0
+        self, dynamics: InverseDynamics, wanted: Array, ahead: Array | None = None
     ) -> None:
         """Send the torque that leads to a velocity (nv,), by K_v and an acceleration (nv,) ahead.
 
         Accelerations are kept within their limits, before the torque rate of the dynamics.
         """
-        rows = dynamics.rows
-        acceleration = EVADING_GAIN * (wanted - rows[AHEAD_VELOCITY]) + ahead
-        most = HELD_SHARE * self._arm.limits.acceleration
-        rows[ATTRACT], rows[BRAKE] = np.clip(acceleration, -most, most), 0.0
-        straight_torque(*dynamics.terms, rows, dynamics.sent)
+        _send(*dynamics.terms, dynamics.rows, dynamics.sent, wanted, self._none if ahead is None else ahead, self._most)
 
     def _write_rows(self, q: Array, v: Array, angles: Array) -> None:
         """Write ∇h · q̇ ≥ b of all rows, [∇h, b] (nv + 1,), in blocks of the number of pairs."""
@@ -205,16 +219,16 @@ class Evasion:
     def _look_ahead(self, v: Array, angles: Array, ahead: float) -> int:
         """Write the rows of misses in some time [s], and return how many."""
         world, pairs, arm = self._world, self._pairs, self._arm
-        miss, way = self._margin + self.parameters.miss, np.abs(v) * ahead
-        reach = np.array([miss + _MISS_REACH, ahead])
+        miss = self._margin + self.parameters.miss
         n = _may_meet(
             pairs.state,
             pairs.rows,
             self._is_moving,
             world.lipschitz,
             world.twist,
-            way,
-            reach,
+            v,
+            ahead,
+            miss + _MISS_REACH,
             self._near,
         )
         if not n:
@@ -224,67 +238,105 @@ class Evasion:
         pin.computeJointJacobians(arm.model, self._data, arm.configurations(there))
         pin.updateGeometryPlacements(arm.model, self._data, world.geometry_model, data)
         for shape, k in {self._obstacle_of[k]: k for k in near.tolist()}.items():
-            data.oMg[shape] = _pose_ahead(data.oMg[shape], world.twist[k], ahead)
+            if world.twist[k, 3:].any():
+                self._poses[shape] = _pose_ahead(self._poses[shape], world.twist[k], ahead)
+            else:
+                self._places[shape] += ahead * world.twist[k, :3]
         self._queries.ask(near)
         begin, soon = self._turn * world.n_pairs, max(ahead - _LAG, _SOONEST)
-        numbers, rows = np.array([miss, soon]), self._queries.rows
+        rows = self._queries.rows
         return int(
-            _miss_rows(near, rows, self._jacobian, world.sign, v, numbers, self._rows[begin:])
+            _miss_rows(near, rows, self._jacobian, world.sign, v, miss, soon, self._rows[begin:])
         )
 
 
 def _pose_ahead(pose: pin.SE3, twist: Array, ahead: float) -> pin.SE3:
     """Return where a body is in some time [s], of a velocity as in `ChangingObstacles.twist`."""
     linear, angular = twist[:3], twist[3:]
-    if not angular.any():
-        return pin.SE3(pose.rotation, pose.translation + ahead * linear)
     moved = pose.translation + ahead * (linear + np.cross(angular, pose.translation))
     return pin.SE3(pin.exp3(ahead * angular) @ pose.rotation, moved)
 
 
 @compiled
-def _widen(reach: Array, is_moving: NDArray[np.bool_], twist: Array, ahead: Array) -> None:
+def _note_moving(
+    is_moving: NDArray[np.bool_],
+    has_motion: NDArray[np.bool_],
+    way: Array,
+    way_before: Array,
+    twist: Array,
+    ahead: Array,
+    reach: Array,
+) -> bool:
+    """Note which pairs have an obstacle that moves; if any has, widen the reach of all."""
+    some = False
     for k in range(reach.shape[0]):
+        is_moving[k] = has_motion[k] or way[k] != way_before[k]
+        some |= is_moving[k]
+    for k in range(reach.shape[0] if some else 0):
         far = ahead[0]
         if is_moving[k]:
             far += ahead[1] * math.sqrt(twist[k, 0] ** 2 + twist[k, 1] ** 2 + twist[k, 2] ** 2)
         reach[k] = max(reach[k], far)
+    return some
 
 
 @compiled
-def _bounds(angles: Array, v: Array, nominal: Array, limits: Array) -> tuple[Array, Array, Array]:
-    n = v.size
-    low, high, wanted = np.empty(n), np.empty(n), np.empty(n)
+def _choose(
+    angles: Array,
+    v: Array,
+    nominal: Array,
+    limits: Array,
+    rows: Array,
+    count: NDArray[np.int64],
+    chosen: Array,
+    lower: Array,
+    upper: Array,
+    wanted: Array,
+) -> tuple[int, bool]:
+    """Choose rows that some velocity in reach breaks; return how many, and if none is broken.
+
+    `lower` begins with the bounds of velocities, and goes on with those of the rows.
+    """
+    some, holds, n = 0, True, v.size
     for i in range(n):
         change, most = limits[3, i] / EVADING_GAIN, limits[2, i]
         least = -min(most, _RECOVERY * max(angles[i] - limits[0, i], 0.0))
         most = min(most, _RECOVERY * max(limits[1, i] - angles[i], 0.0))
-        low[i] = min(max(least, v[i] - change), v[i] + change)
-        high[i] = min(max(most, v[i] - change), v[i] + change)
-        wanted[i] = min(max(nominal[i], low[i]), high[i])
-    return low, high, wanted
-
-
-@compiled
-def _in_reach(
-    rows: Array, count: NDArray[np.int64], low: Array, high: Array, wanted: Array, chosen: Array
-) -> tuple[int, bool]:
-    """Choose rows that some velocity in reach breaks; return how many, and if none is broken."""
-    some, holds, n = 0, True, low.size
+        lower[i] = min(max(least, v[i] - change), v[i] + change)
+        upper[i] = min(max(most, v[i] - change), v[i] + change)
+        wanted[i] = min(max(nominal[i], lower[i]), upper[i])
     size = rows.shape[0] // count.size
     for block in range(count.size):
         for k in range(block * size, block * size + count[block]):
             least, now = 0.0, 0.0
             for j in range(n):
                 slope = rows[k, j]
-                least += slope * (low[j] if slope > 0.0 else high[j])
+                least += slope * (lower[j] if slope > 0.0 else upper[j])
                 now += slope * wanted[j]
             if least < rows[k, n]:
                 holds &= now >= rows[k, n]
-                for j in range(n + 1):
+                for j in range(n):
                     chosen[some, j] = rows[k, j]
+                lower[n + some] = rows[k, n]
                 some += 1
     return some, holds
+
+
+@compiled
+def _send(
+    mass: Array,
+    nonlinear: Array,
+    gravity: Array,
+    rows: Array,
+    sent: Array,
+    wanted: Array,
+    ahead: Array,
+    most: Array,
+) -> None:
+    for i in range(most.size):
+        a = EVADING_GAIN * (wanted[i] - rows[AHEAD_VELOCITY, i]) + ahead[i]
+        rows[ATTRACT, i], rows[BRAKE, i] = min(max(a, -most[i]), most[i]), 0.0
+    straight_torque(mass, nonlinear, gravity, rows, sent)
 
 
 @compiled
@@ -294,16 +346,21 @@ def _may_meet(
     is_moving: NDArray[np.bool_],
     lipschitz: Array,
     twist: Array,
-    way: Array,
-    reach: Array,
+    v: Array,
+    ahead: float,
+    reach: float,
     near: NDArray[np.int64],
 ) -> int:
+    """Write which pairs may be within reach after some time, as things go now; return how many."""
     count = 0
     for k in range(state.shape[0]):
         if state[k] == 0 or not is_moving[k]:
             continue
         speed = math.sqrt(twist[k, 0] ** 2 + twist[k, 1] ** 2 + twist[k, 2] ** 2)
-        if rows[k, 0] - speed * reach[1] - pair_motion(lipschitz, k, way) < reach[0]:
+        left = rows[k, 0] - speed * ahead
+        for j in range(v.size):
+            left -= lipschitz[k, j] * abs(v[j]) * ahead
+        if left < reach:
             near[count] = k
             count += 1
     return count
@@ -316,15 +373,16 @@ def _miss_rows(
     jacobian: Array,
     sign: Array,
     v: Array,
-    numbers: Array,
+    miss: float,
+    soon: float,
     table: Array,
 ) -> int:
     count, n = 0, v.size
     for k in near:
-        h = rows[k, 0] - numbers[0]
+        h = rows[k, 0] - miss
         if h <= _MISS_REACH:
             table[count, n] = _write_slope(rows[k], jacobian, sign[k], v, table[count])
-            table[count, n] -= h / numbers[1]
+            table[count, n] -= h / soon
             count += 1
     return count
 

@@ -202,20 +202,18 @@ class DensityTracking:
 
         It returns no faster than it can stop, and hands over where little is left to return.
         """
-        numbers, rows, sample = self._numbers, self._dynamics.rows, self._sample
-        error, follow = sample[_ERROR], numbers[_RATE] * sample[_VELOCITY]
-        off = np.abs(error)
-        stopping = np.sqrt(_EVADED_SHARE * self._arm.limits.acceleration * off)
-        back = np.copysign(np.minimum(self._gains.rate * off, stopping), error)
-        v = rows[AHEAD_VELOCITY]
-        wanted, gives_way = self._evasion.velocity(q, v, follow - back)
-        is_off = off.max() > _HANDED_OVER[0] or np.abs(v - follow).max() > _HANDED_OVER[1]
+        numbers, rows = self._numbers, self._dynamics.rows
+        wanted, limits = np.empty(self._arm.nv), self._arm.limits
+        is_off = _return(
+            numbers, rows, self._sample, self._gains.rate, limits.acceleration, wanted
+        )
         is_off |= self.is_moving and abs(1.0 - numbers[_RATE]) > _HANDED_OVER[1]
+        wanted, gives_way = self._evasion.velocity(q, rows[AHEAD_VELOCITY], wanted)
         self.is_evading = gives_way or (self.is_evading and bool(is_off))
         if self.is_evading:
             numbers[_EMERGENCY] = 0.0
-            rows[RATE_LIMIT] = numbers[_ELAPSED] * self._arm.limits.torque_rate
-            ahead = 0.0 if gives_way else rows[BRAKE]
+            rows[RATE_LIMIT] = numbers[_ELAPSED] * limits.torque_rate
+            ahead = None if gives_way else rows[BRAKE]
             self._evasion.send_torque(self._dynamics, wanted, ahead)
 
     def pause(self) -> None:
@@ -324,6 +322,22 @@ _LEAST_SHARE = 0.1  # of torque that counts as left
 _RETURN_SHARE = 0.25  # of the velocity limits, at which an arm returns from a push
 _PUSHED, _RETURNED = 0.5, 0.05  # velocity off by a push [rad/s or m/s], error after it [rad or m]
 _LARGEST_GAIN = 0.4  # of K_v times the time that a torque is late
+
+
+@compiled
+def _return(
+    numbers: Array, rows: Array, sample: Array, gain: float, most: Array, wanted: Array
+) -> bool:
+    """Write the velocity back to the reference; return whether the arm is off it."""
+    rate, is_off = numbers[_RATE], False
+    for i in range(most.size):
+        error, follow = sample[_ERROR, i], rate * sample[_VELOCITY, i]
+        off = abs(error)
+        back = math.copysign(min(gain * off, math.sqrt(_EVADED_SHARE * most[i] * off)), error)
+        wanted[i] = follow - back
+        is_off |= off > _HANDED_OVER[0]
+        is_off |= abs(rows[AHEAD_VELOCITY, i] - follow) > _HANDED_OVER[1]
+    return is_off
 
 
 @compiled
