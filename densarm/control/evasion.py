@@ -3,20 +3,20 @@
 import math
 from dataclasses import dataclass
 
-import daqp
 import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
 from densarm.control.disturbance_observer import AHEAD_VELOCITY
 from densarm.control.inverse_dynamics import ATTRACT, BRAKE, InverseDynamics, straight_torque
+from densarm.control.soft_rows import nearest_in_box
 from densarm.density.inverse_bump import log_inverse_bump
 from densarm.values.arrays import Array
 from densarm.values.checks import non_negative, positive
 from densarm.values.documented import documented
 from densarm.values.kernels import compiled, compiled_part
 from densarm.world.active_pairs import ActivePairs
-from densarm.world.distance_view import add_pair_gradient, pair_rate
+from densarm.world.distance_view import add_pair_gradient, pair_rate, shape_positions
 from densarm.world.pair_queries import PairQueries
 from densarm.world.stopping import HELD_SHARE
 from densarm.world.world import World
@@ -33,10 +33,10 @@ _RECOVERY = 4.0  # [1/s] of a margin that is lost, and at which the way to a joi
 _STANDING_RATE = 10.0  # [1/s] at which the distance to what stands may shrink
 _BRAKE_SHARE = 0.5  # of the accelerations, that a stop before what stands reckons with
 _STANDING_WEIGHT = 10.0  # of what is known for sure, where not all rows can hold
-_SOFTNESS = 1e-4  # reciprocal weight of rows
+_WEIGHT = 1e4  # of a row's lack [rad or m]
 _LEAST_SHARE = 1e-5  # of σ, of h where the bump is evaluated
 _MISS_REACH = 0.12  # [m] beyond which a miss is no row
-_UNBOUNDED = 1e30  # as daqp has it
+_LEAST_LEVER = 1e-9  # [m], of a row that some joint can do something about
 
 
 @documented
@@ -115,18 +115,17 @@ class Evasion:
         n, size = arm.nv, (_TIMES + 1) * world.n_pairs
         # Blocks of rows of the density, and of misses at each time; how many in each; all in reach.
         self._rows, self._count = np.zeros((size, n + 1)), np.zeros(_TIMES + 1, np.int64)
-        self._chosen, self._lower = np.zeros((size, n)), np.zeros(n + size)
+        self._chosen = np.zeros((size, n + 1))
         self._turn, self._looks = 0, False
-        self._obstacle_of = world.pair_shapes[:, 1].tolist()
+        # Shapes of obstacles, and a pair of each.
+        self._bodies = np.array(np.unique(world.pair_shapes[:, 1], return_index=True)).T
         self._near = np.zeros(world.n_pairs, np.int64)
-        self._hessian, self._upper = np.eye(n), np.full(n + size, _UNBOUNDED)
-        self._sense = np.where(np.arange(n + size) < n, 0, 8).astype(np.int32)  # soft beyond bounds
         self._data = arm.model.createData()
         self._jacobian = self._data.J.reshape(6, n)
         geometry = world.geometry_model
         self._queries = PairQueries(arm.model, geometry, world.pair_shapes, remembers=False)
-        self._poses = self._queries.data.oMg
-        self._places = [pose.translation for pose in self._poses]  # views
+        self._places, self._came = shape_positions(self._queries.data), 0
+        self._there, self._radius = np.zeros(n), np.zeros(geometry.ngeoms)
         limits, turns = arm.limits, arm.continuous
         lower, upper = np.where(turns, -np.inf, limits.lower), np.where(turns, np.inf, limits.upper)
         speed = _LIMIT_SHARE * np.minimum(limits.velocity, _FASTEST)
@@ -139,8 +138,9 @@ class Evasion:
         world = self._world
         if world.version != self._version:
             self._version = world.version
-            self._is_needed = _note_moving(
+            self._is_needed, came = _note_moving(
                 self._is_moving,
+                world.changes,
                 world.has_motion,
                 world.obstacle_way,
                 self._way_before,
@@ -148,6 +148,12 @@ class Evasion:
                 self._ahead,
                 self._pairs.reach,
             )
+            if came != self._came:
+                self._came = came
+                for k, item in enumerate(world.geometry_model.geometryObjects):
+                    item.geometry.computeLocalAABB()
+                    off = np.linalg.norm(item.geometry.aabb_center)
+                    self._radius[k] = item.geometry.aabb_radius + off
         return self._is_needed
 
     def velocity(self, q: Array, v: Array, nominal: Array) -> tuple[Array, bool]:
@@ -158,34 +164,12 @@ class Evasion:
             v: velocity (nv,) [rad/s or m/s].
             nominal: q̇_nom (nv,), of which only what the bounds allow is returned.
         """
-        angles, end = self._arm.angles(q), self._arm.nv
+        angles, found = self._arm.angles(q), np.empty(self._arm.nv)
         self._write_rows(q, v, angles)
-        low, high, wanted = self._lower[:end], self._upper[:end], np.empty(end)
-        some, holds = _choose(
-            angles,
-            v,
-            nominal,
-            self._limits,
-            self._rows,
-            self._count,
-            self._chosen,
-            self._lower,
-            high,
-            wanted,
+        gives_way = _nearest(
+            angles, v, nominal, self._limits, self._rows, self._count, self._chosen, found
         )
-        if holds:
-            return wanted, False
-        end += some
-        found, _, flag, _ = daqp.solve(
-            self._hessian,
-            -nominal,
-            self._chosen[:some],
-            self._upper[:end],
-            self._lower[:end],
-            self._sense[:end],
-            rho_soft=_SOFTNESS,
-        )
-        return (np.clip(found, low, high) if flag > 0 else np.clip(0.0, low, high)), True
+        return found, gives_way
 
     def send_torque(
         self, dynamics: InverseDynamics, wanted: Array, ahead: Array | None = None
@@ -220,56 +204,66 @@ class Evasion:
         """Write the rows of misses in some time [s], and return how many."""
         world, pairs, arm = self._world, self._pairs, self._arm
         miss = self._margin + self.parameters.miss
-        n = _may_meet(
+        reach, there = miss + _MISS_REACH, self._there
+        n, turns = _may_meet(
             pairs.state,
             pairs.rows,
             self._is_moving,
             world.lipschitz,
             world.twist,
+            angles,
             v,
+            self._limits,
             ahead,
-            miss + _MISS_REACH,
+            reach,
             self._near,
+            there,
         )
         if not n:
             return 0
-        near, data = self._near[:n], self._queries.data
-        there = np.minimum(np.maximum(angles + ahead * v, self._limits[0]), self._limits[1])
+        queries, data = self._queries, self._queries.data
         pin.computeJointJacobians(arm.model, self._data, arm.configurations(there))
         pin.updateGeometryPlacements(arm.model, self._data, world.geometry_model, data)
-        for shape, k in {self._obstacle_of[k]: k for k in near.tolist()}.items():
+        for shape, k in self._bodies.tolist() if turns else ():
             if world.twist[k, 3:].any():
-                self._poses[shape] = _pose_ahead(self._poses[shape], world.twist[k], ahead)
-            else:
-                self._places[shape] += ahead * world.twist[k, :3]
-        self._queries.ask(near)
-        begin, soon = self._turn * world.n_pairs, max(ahead - _LAG, _SOONEST)
-        rows = self._queries.rows
-        return int(
-            _miss_rows(near, rows, self._jacobian, world.sign, v, miss, soon, self._rows[begin:])
+                data.oMg[shape].rotation = pin.exp3(ahead * world.twist[k, 3:]) @ data.oMg[shape].rotation
+        n = _meet(
+            self._near[:n],
+            self._bodies,
+            world.pair_shapes,
+            self._places,
+            self._radius,
+            world.twist,
+            ahead,
+            reach,
         )
-
-
-def _pose_ahead(pose: pin.SE3, twist: Array, ahead: float) -> pin.SE3:
-    """Return where a body is in some time [s], of a velocity as in `ChangingObstacles.twist`."""
-    linear, angular = twist[:3], twist[3:]
-    moved = pose.translation + ahead * (linear + np.cross(angular, pose.translation))
-    return pin.SE3(pin.exp3(ahead * angular) @ pose.rotation, moved)
+        near, begin, soon = self._near[:n], self._turn * world.n_pairs, max(ahead - _LAG, _SOONEST)
+        queries.ask(near)
+        table = self._rows[begin:]
+        return int(
+            _miss_rows(near, queries.rows, self._jacobian, world.sign, v, miss, soon, table)
+        )
 
 
 @compiled
 def _note_moving(
     is_moving: NDArray[np.bool_],
+    changes: NDArray[np.int64],
     has_motion: NDArray[np.bool_],
     way: Array,
     way_before: Array,
     twist: Array,
     ahead: Array,
     reach: Array,
-) -> bool:
-    """Note which pairs have an obstacle that moves; if any has, widen the reach of all."""
-    some = False
+) -> tuple[bool, int]:
+    """Note which pairs have an obstacle that moves; if any has, widen the reach of all.
+
+    Returns:
+        Whether any has, and which change of the world the last obstacle came with.
+    """
+    some, came = False, 0
     for k in range(reach.shape[0]):
+        came = max(came, changes[k])
         is_moving[k] = has_motion[k] or way[k] != way_before[k]
         some |= is_moving[k]
     for k in range(reach.shape[0] if some else 0):
@@ -277,11 +271,11 @@ def _note_moving(
         if is_moving[k]:
             far += ahead[1] * math.sqrt(twist[k, 0] ** 2 + twist[k, 1] ** 2 + twist[k, 2] ** 2)
         reach[k] = max(reach[k], far)
-    return some
+    return some, came
 
 
 @compiled
-def _choose(
+def _nearest(
     angles: Array,
     v: Array,
     nominal: Array,
@@ -289,37 +283,35 @@ def _choose(
     rows: Array,
     count: NDArray[np.int64],
     chosen: Array,
-    lower: Array,
-    upper: Array,
-    wanted: Array,
-) -> tuple[int, bool]:
-    """Choose rows that some velocity in reach breaks; return how many, and if none is broken.
-
-    `lower` begins with the bounds of velocities, and goes on with those of the rows.
-    """
+    found: Array,
+) -> bool:
+    """Write the velocity within the bounds that the rows ask for; return whether they do so."""
     some, holds, n = 0, True, v.size
+    low, high = np.empty(n), np.empty(n)
     for i in range(n):
         change, most = limits[3, i] / EVADING_GAIN, limits[2, i]
         least = -min(most, _RECOVERY * max(angles[i] - limits[0, i], 0.0))
         most = min(most, _RECOVERY * max(limits[1, i] - angles[i], 0.0))
-        lower[i] = min(max(least, v[i] - change), v[i] + change)
-        upper[i] = min(max(most, v[i] - change), v[i] + change)
-        wanted[i] = min(max(nominal[i], lower[i]), upper[i])
+        low[i] = min(max(least, v[i] - change), v[i] + change)
+        high[i] = min(max(most, v[i] - change), v[i] + change)
+        found[i] = min(max(nominal[i], low[i]), high[i])
     size = rows.shape[0] // count.size
     for block in range(count.size):
         for k in range(block * size, block * size + count[block]):
-            least, now = 0.0, 0.0
+            least, now, lever = 0.0, 0.0, 0.0
             for j in range(n):
                 slope = rows[k, j]
-                least += slope * (lower[j] if slope > 0.0 else upper[j])
-                now += slope * wanted[j]
-            if least < rows[k, n]:
+                least += slope * (low[j] if slope > 0.0 else high[j])
+                now += slope * found[j]
+                lever += slope * slope
+            if least < rows[k, n] and lever > _LEAST_LEVER**2:
                 holds &= now >= rows[k, n]
-                for j in range(n):
-                    chosen[some, j] = rows[k, j]
-                lower[n + some] = rows[k, n]
+                for j in range(n + 1):
+                    chosen[some, j] = rows[k, j] / math.sqrt(lever)
                 some += 1
-    return some, holds
+    if not holds:
+        nearest_in_box(nominal, chosen[:some, :n], chosen[:some, n], low, high, _WEIGHT, found)
+    return not holds
 
 
 @compiled
@@ -346,13 +338,20 @@ def _may_meet(
     is_moving: NDArray[np.bool_],
     lipschitz: Array,
     twist: Array,
+    angles: Array,
     v: Array,
+    limits: Array,
     ahead: float,
     reach: float,
     near: NDArray[np.int64],
-) -> int:
-    """Write which pairs may be within reach after some time, as things go now; return how many."""
-    count = 0
+    there: Array,
+) -> tuple[int, bool]:
+    """Write which pairs may be within reach after some time, and where the joints are then.
+
+    Returns:
+        How many, and whether the obstacle of any of them turns.
+    """
+    count, turns = 0, False
     for k in range(state.shape[0]):
         if state[k] == 0 or not is_moving[k]:
             continue
@@ -361,6 +360,39 @@ def _may_meet(
         for j in range(v.size):
             left -= lipschitz[k, j] * abs(v[j]) * ahead
         if left < reach:
+            near[count] = k
+            count += 1
+            turns |= twist[k, 3] != 0.0 or twist[k, 4] != 0.0 or twist[k, 5] != 0.0
+    for j in range(v.size):
+        there[j] = min(max(angles[j] + ahead * v[j], limits[0, j]), limits[1, j])
+    return count, turns
+
+
+@compiled
+def _meet(
+    near: NDArray[np.int64],
+    bodies: NDArray[np.int64],
+    pair_shapes: NDArray[np.int64],
+    places: Array,
+    radius: Array,
+    twist: Array,
+    ahead: float,
+    reach: float,
+) -> int:
+    """Move obstacles on, and keep pairs whose balls are within reach; return how many are left."""
+    for b in range(bodies.shape[0]):
+        shape, k = bodies[b]
+        x, y, z = places[shape]
+        wx, wy, wz = twist[k, 3:]
+        places[shape, 0] += ahead * (twist[k, 0] + (wy * z - wz * y))
+        places[shape, 1] += ahead * (twist[k, 1] + (wz * x - wx * z))
+        places[shape, 2] += ahead * (twist[k, 2] + (wx * y - wy * x))
+    count = 0
+    for k in near:
+        first, second = pair_shapes[k]
+        gap = -radius[first] - radius[second]
+        gap += math.sqrt(((places[first] - places[second]) ** 2).sum())
+        if not gap > reach:  # a half-space has no middle
             near[count] = k
             count += 1
     return count
