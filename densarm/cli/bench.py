@@ -46,9 +46,7 @@ def bench() -> None:
 @number_option("--steps", 20_000, "Steps to be timed, at 1 kHz along a motion.")
 @number_option("--moving", 0, "Spheres that move in a third turn, which are evaded.", least=0)
 @output_option("--json", "FILE", "Write the result as JSON.")
-def step(
-    arm: str, shapes: str, pairs: int, steps: int, moving: int, json: Path | None
-) -> None:
+def step(arm: str, shapes: str, pairs: int, steps: int, moving: int, json: Path | None) -> None:
     """Time one control step of the density tracking controller.
 
     The whole `controller.torque` is compared with bare calls of Pinocchio and coal for the
@@ -77,14 +75,15 @@ def step(
     click.echo(f"bare calls         {result.bare_us:.1f} µs")
     click.echo(f"ratio              {result.ratio:.2f}")
     if result.evading_us is not None:
-        times = f"{result.evading_us:.1f} µs, {result.evading_ratio:.2f} of the step"
-        click.echo(f"evading            {times}, {moving} spheres moving")
+        ratio = f"{result.evading_ratio:.2f} of the step, {moving} spheres moving"
+        click.echo(f"evading            {result.evading_us:.1f} µs, {ratio}")
     click.echo(f"pairs              {result.pairs}")
     for name, times in (
         ("controller.torque", result.step_percentiles_us),
         ("  undisturbed", result.undisturbed_percentiles_us),
         ("  steady", result.steady_percentiles_us),
         ("bare calls", result.bare_percentiles_us),
+        ("evading", result.evading_percentiles_us),
     ):
         if times:
             at = ", ".join(f"{time:.1f}" for time in times)

@@ -4,20 +4,19 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-import pinocchio as pin
 from numpy.typing import NDArray
 
 from densarm.control.disturbance_observer import AHEAD_VELOCITY
 from densarm.control.inverse_dynamics import ATTRACT, BRAKE, InverseDynamics, straight_torque
+from densarm.control.misses import MissesAhead, write_slope
 from densarm.control.soft_rows import nearest_in_box
 from densarm.density.inverse_bump import log_inverse_bump
 from densarm.values.arrays import Array
 from densarm.values.checks import non_negative, positive
 from densarm.values.documented import documented
-from densarm.values.kernels import compiled, compiled_part
-from densarm.world.active_pairs import ActivePairs
-from densarm.world.distance_view import add_pair_gradient, pair_rate, shape_positions
-from densarm.world.pair_queries import PairQueries
+from densarm.values.kernels import compiled
+from densarm.world.active_pairs import ActivePairs, pair_motion
+from densarm.world.distance_view import pair_rate
 from densarm.world.stopping import HELD_SHARE
 from densarm.world.world import World
 
@@ -26,16 +25,13 @@ EVADING_GAIN = 40.0
 
 _LIMIT_SHARE = 0.85  # of velocities and accelerations, since torque lags behind by its rate
 _TIMES = 6  # at which misses are looked for, one every other call in turn
-_LAG = 0.04  # [s] until a velocity that is asked for is reached
-_SOONEST = 0.03  # [s] in which a miss is made good
 _FASTEST = 1e3  # [rad/s or m/s], where joints have no limit
 _RECOVERY = 4.0  # [1/s] of a margin that is lost, and at which the way to a joint limit shrinks
 _STANDING_RATE = 10.0  # [1/s] at which the distance to what stands may shrink
 _BRAKE_SHARE = 0.5  # of the accelerations, that a stop before what stands reckons with
-_STANDING_WEIGHT = 10.0  # of what is known for sure, where not all rows can hold
+_REACH_SHARE = 1.1  # of what accelerations reach, since reach is of the next step
 _WEIGHT = 1e4  # of a row's lack [rad or m]
 _LEAST_SHARE = 1e-5  # of σ, of h where the bump is evaluated
-_MISS_REACH = 0.12  # [m] beyond which a miss is no row
 _LEAST_LEVER = 1e-9  # [m], of a row that some joint can do something about
 
 
@@ -86,9 +82,9 @@ class Evasion:
     gradient that there, and τ_0 the time in which a velocity is reached. Times up to the horizon
     take turns. a_k is half of what the accelerations make along ∇h_k, so that the arm stops in time
     where it flees. Bounds on q̇ are those of velocities, of what accelerations reach within 1/K_v,
-    and of the way to joint limits. Rows are soft, since not all can hold at times: those of what
-    stands weigh ten times as much, bounds hold always. Rows that hold for all velocities in reach
-    are left out, and where q̇_nom keeps all there is no problem to solve.
+    and of the way to joint limits. Rows are soft, since not all can hold at times, each measured
+    along its gradient [rad/s or m/s]; bounds hold always. Rows that hold for all velocities in
+    reach are left out, and where q̇_nom keeps all there is no problem to solve.
 
     Args:
         world: the pairs; obstacles count as moving that have a motion, or were moved since now.
@@ -107,7 +103,7 @@ class Evasion:
         margin: float,
         parameters: EvasionParameters = EvasionParameters(),
     ) -> None:
-        arm, p, self._margin = world.arm, parameters, margin
+        arm, p = world.arm, parameters
         self._world, self._arm, self._pairs, self.parameters = world, arm, pairs, p
         self._version, self._way_before = 0, world.obstacle_way.copy()
         self._is_moving, self._is_needed = np.zeros(world.n_pairs, bool), False
@@ -117,19 +113,12 @@ class Evasion:
         self._rows, self._count = np.zeros((size, n + 1)), np.zeros(_TIMES + 1, np.int64)
         self._chosen = np.zeros((size, n + 1))
         self._turn, self._looks = 0, False
-        # Shapes of obstacles, and a pair of each.
-        self._bodies = np.array(np.unique(world.pair_shapes[:, 1], return_index=True)).T
-        self._near = np.zeros(world.n_pairs, np.int64)
-        self._data = arm.model.createData()
-        self._jacobian = self._data.J.reshape(6, n)
-        geometry = world.geometry_model
-        self._queries = PairQueries(arm.model, geometry, world.pair_shapes, remembers=False)
-        self._places, self._came = shape_positions(self._queries.data), 0
-        self._there, self._radius = np.zeros(n), np.zeros(geometry.ngeoms)
+        self._misses = MissesAhead(world, pairs, margin + p.miss)
         limits, turns = arm.limits, arm.continuous
         lower, upper = np.where(turns, -np.inf, limits.lower), np.where(turns, np.inf, limits.upper)
         speed = _LIMIT_SHARE * np.minimum(limits.velocity, _FASTEST)
         self._limits = np.array([lower, upper, speed, _LIMIT_SHARE * limits.acceleration])
+        self._reaches = np.full((2, world.n_pairs), np.nan)
         self._density = np.array([margin, p.distance, p.decay, p.margin, p.reaction])
         self._most, self._none = HELD_SHARE * limits.acceleration, np.zeros(n)
 
@@ -138,9 +127,8 @@ class Evasion:
         world = self._world
         if world.version != self._version:
             self._version = world.version
-            self._is_needed, came = _note_moving(
+            self._is_needed = _note_moving(
                 self._is_moving,
-                world.changes,
                 world.has_motion,
                 world.obstacle_way,
                 self._way_before,
@@ -148,12 +136,6 @@ class Evasion:
                 self._ahead,
                 self._pairs.reach,
             )
-            if came != self._came:
-                self._came = came
-                for k, item in enumerate(world.geometry_model.geometryObjects):
-                    item.geometry.computeLocalAABB()
-                    off = np.linalg.norm(item.geometry.aabb_center)
-                    self._radius[k] = item.geometry.aabb_radius + off
         return self._is_needed
 
     def velocity(self, q: Array, v: Array, nominal: Array) -> tuple[Array, bool]:
@@ -178,7 +160,8 @@ class Evasion:
 
         Accelerations are kept within their limits, before the torque rate of the dynamics.
         """
-        _send(*dynamics.terms, dynamics.rows, dynamics.sent, wanted, self._none if ahead is None else ahead, self._most)
+        ahead = self._none if ahead is None else ahead
+        _send(*dynamics.terms, dynamics.rows, dynamics.sent, wanted, ahead, self._most)
 
     def _write_rows(self, q: Array, v: Array, angles: Array) -> None:
         """Write ∇h · q̇ ≥ b of all rows, [∇h, b] (nv + 1,), in blocks of the number of pairs."""
@@ -193,85 +176,39 @@ class Evasion:
             self._density,
             v,
             self._limits,
+            world.lipschitz,
+            pairs.reach,
+            self._reaches,
             self._rows,
         )
         self._looks = not self._looks and horizon > 0.0
         if self._looks:
             self._turn = self._turn % _TIMES + 1
-            self._count[self._turn] = self._look_ahead(v, angles, horizon * self._turn / _TIMES)
-
-    def _look_ahead(self, v: Array, angles: Array, ahead: float) -> int:
-        """Write the rows of misses in some time [s], and return how many."""
-        world, pairs, arm = self._world, self._pairs, self._arm
-        miss = self._margin + self.parameters.miss
-        reach, there = miss + _MISS_REACH, self._there
-        n, turns = _may_meet(
-            pairs.state,
-            pairs.rows,
-            self._is_moving,
-            world.lipschitz,
-            world.twist,
-            angles,
-            v,
-            self._limits,
-            ahead,
-            reach,
-            self._near,
-            there,
-        )
-        if not n:
-            return 0
-        queries, data = self._queries, self._queries.data
-        pin.computeJointJacobians(arm.model, self._data, arm.configurations(there))
-        pin.updateGeometryPlacements(arm.model, self._data, world.geometry_model, data)
-        for shape, k in self._bodies.tolist() if turns else ():
-            if world.twist[k, 3:].any():
-                data.oMg[shape].rotation = pin.exp3(ahead * world.twist[k, 3:]) @ data.oMg[shape].rotation
-        n = _meet(
-            self._near[:n],
-            self._bodies,
-            world.pair_shapes,
-            self._places,
-            self._radius,
-            world.twist,
-            ahead,
-            reach,
-        )
-        near, begin, soon = self._near[:n], self._turn * world.n_pairs, max(ahead - _LAG, _SOONEST)
-        queries.ask(near)
-        table = self._rows[begin:]
-        return int(
-            _miss_rows(near, queries.rows, self._jacobian, world.sign, v, miss, soon, table)
-        )
+            ahead, table = horizon * self._turn / _TIMES, self._rows[self._turn * world.n_pairs :]
+            self._count[self._turn] = self._misses.write(
+                self._is_moving, angles, v, self._limits, ahead, table
+            )
 
 
 @compiled
 def _note_moving(
     is_moving: NDArray[np.bool_],
-    changes: NDArray[np.int64],
     has_motion: NDArray[np.bool_],
     way: Array,
     way_before: Array,
     twist: Array,
     ahead: Array,
     reach: Array,
-) -> tuple[bool, int]:
-    """Note which pairs have an obstacle that moves; if any has, widen the reach of all.
-
-    Returns:
-        Whether any has, and which change of the world the last obstacle came with.
-    """
-    some, came = False, 0
+) -> bool:
+    """Note which pairs have an obstacle that moves, widen their reach, and return if any has."""
+    some = False
     for k in range(reach.shape[0]):
-        came = max(came, changes[k])
         is_moving[k] = has_motion[k] or way[k] != way_before[k]
         some |= is_moving[k]
-    for k in range(reach.shape[0] if some else 0):
-        far = ahead[0]
         if is_moving[k]:
-            far += ahead[1] * math.sqrt(twist[k, 0] ** 2 + twist[k, 1] ** 2 + twist[k, 2] ** 2)
-        reach[k] = max(reach[k], far)
-    return some, came
+            speed = math.sqrt(twist[k, 0] ** 2 + twist[k, 1] ** 2 + twist[k, 2] ** 2)
+            reach[k] = max(reach[k], ahead[0] + ahead[1] * speed)
+    return some
 
 
 @compiled
@@ -332,94 +269,6 @@ def _send(
 
 
 @compiled
-def _may_meet(
-    state: NDArray[np.int64],
-    rows: Array,
-    is_moving: NDArray[np.bool_],
-    lipschitz: Array,
-    twist: Array,
-    angles: Array,
-    v: Array,
-    limits: Array,
-    ahead: float,
-    reach: float,
-    near: NDArray[np.int64],
-    there: Array,
-) -> tuple[int, bool]:
-    """Write which pairs may be within reach after some time, and where the joints are then.
-
-    Returns:
-        How many, and whether the obstacle of any of them turns.
-    """
-    count, turns = 0, False
-    for k in range(state.shape[0]):
-        if state[k] == 0 or not is_moving[k]:
-            continue
-        speed = math.sqrt(twist[k, 0] ** 2 + twist[k, 1] ** 2 + twist[k, 2] ** 2)
-        left = rows[k, 0] - speed * ahead
-        for j in range(v.size):
-            left -= lipschitz[k, j] * abs(v[j]) * ahead
-        if left < reach:
-            near[count] = k
-            count += 1
-            turns |= twist[k, 3] != 0.0 or twist[k, 4] != 0.0 or twist[k, 5] != 0.0
-    for j in range(v.size):
-        there[j] = min(max(angles[j] + ahead * v[j], limits[0, j]), limits[1, j])
-    return count, turns
-
-
-@compiled
-def _meet(
-    near: NDArray[np.int64],
-    bodies: NDArray[np.int64],
-    pair_shapes: NDArray[np.int64],
-    places: Array,
-    radius: Array,
-    twist: Array,
-    ahead: float,
-    reach: float,
-) -> int:
-    """Move obstacles on, and keep pairs whose balls are within reach; return how many are left."""
-    for b in range(bodies.shape[0]):
-        shape, k = bodies[b]
-        x, y, z = places[shape]
-        wx, wy, wz = twist[k, 3:]
-        places[shape, 0] += ahead * (twist[k, 0] + (wy * z - wz * y))
-        places[shape, 1] += ahead * (twist[k, 1] + (wz * x - wx * z))
-        places[shape, 2] += ahead * (twist[k, 2] + (wx * y - wy * x))
-    count = 0
-    for k in near:
-        first, second = pair_shapes[k]
-        gap = -radius[first] - radius[second]
-        gap += math.sqrt(((places[first] - places[second]) ** 2).sum())
-        if not gap > reach:  # a half-space has no middle
-            near[count] = k
-            count += 1
-    return count
-
-
-@compiled
-def _miss_rows(
-    near: NDArray[np.int64],
-    rows: Array,
-    jacobian: Array,
-    sign: Array,
-    v: Array,
-    miss: float,
-    soon: float,
-    table: Array,
-) -> int:
-    count, n = 0, v.size
-    for k in near:
-        h = rows[k, 0] - miss
-        if h <= _MISS_REACH:
-            table[count, n] = _write_slope(rows[k], jacobian, sign[k], v, table[count])
-            table[count, n] -= h / soon
-            count += 1
-    return count
-
-
-@compiled
 def _density_rows(
     state: NDArray[np.int64],
     rows: Array,
@@ -430,11 +279,28 @@ def _density_rows(
     numbers: Array,
     v: Array,
     limits: Array,
+    lipschitz: Array,
+    reach: Array,
+    reaches: Array,
     table: Array,
 ) -> int:
+    """Write the rows of pairs awake, and how far those that stand are to be awake; return how many.
+
+    Farther off no velocity in reach breaks a row. `reaches` are those of others, and as written.
+    """
     margin, width, decay, extra, reaction = numbers
     count, n = 0, v.size
+    fastest, soonest = np.empty(n), 0.0
+    for j in range(n):
+        fastest[j] = abs(v[j]) + _REACH_SHARE * limits[3, j] / EVADING_GAIN
+        soonest = max(soonest, fastest[j] / (2.0 * _BRAKE_SHARE * limits[3, j]))
     for k in range(state.shape[0]):
+        if not is_moving[k]:
+            closing = pair_motion(lipschitz, k, fastest)
+            far = margin + (reaction + max(1.0 / _STANDING_RATE, soonest)) * closing
+            if reach[k] != reaches[1, k]:
+                reaches[0, k] = reach[k]
+            reach[k] = reaches[1, k] = max(reaches[0, k], min(far, margin + width))
         h, rate = rows[k, 0] - margin, 0.0
         if is_moving[k]:
             rate = pair_rate(rows[k], twist[k])
@@ -442,7 +308,7 @@ def _density_rows(
         if state[k] == 0 or h >= width:
             continue
         row = table[count]
-        speed = _write_slope(rows[k], jacobian, sign[k], v, row)
+        speed = write_slope(rows[k], jacobian, sign[k], v, row)
         if is_moving[k]:
             slope = log_inverse_bump(max(h, _LEAST_SHARE * width), width, 0.0)[1]
             row[n] = -decay / slope - rate - _RECOVERY * min(h, 0.0)
@@ -452,19 +318,5 @@ def _density_rows(
                 brake += abs(row[j]) * limits[3, j]
             left = max(h - reaction * max(-speed, 0.0), 0.0)
             row[n] = -min(_STANDING_RATE * left, math.sqrt(2.0 * _BRAKE_SHARE * brake * left))
-            for j in range(n + 1):
-                row[j] *= _STANDING_WEIGHT
         count += 1
     return count
-
-
-@compiled_part
-def _write_slope(distance: Array, jacobian: Array, sign: Array, v: Array, row: Array) -> float:
-    """Write the gradient of a distance, and return how fast the arm changes it [m/s]."""
-    speed, n = 0.0, v.size
-    for j in range(n):
-        row[j] = 0.0
-    add_pair_gradient(distance, jacobian, sign, 1.0, row[:n])
-    for j in range(n):
-        speed += row[j] * v[j]
-    return speed

@@ -46,40 +46,8 @@ def nearest_in_box(
     for i in range(n):
         x[i] = min(max(wanted[i], low[i]), high[i])
     for _ in range(_ROUNDS):
-        for i in range(n):
-            gradient[i] = x[i] - wanted[i]
-            for j in range(i + 1):
-                hessian[i, j] = 0.0
-            hessian[i, i] = 1.0
-        for k in range(count):
-            left = -least[k]
-            for i in range(n):
-                left += rows[k, i] * x[i]
-            spare[k] = left
-            if left < 0.0:
-                for i in range(n):
-                    scaled = weight * rows[k, i]
-                    gradient[i] += scaled * left
-                    for j in range(i + 1):
-                        hessian[i, j] += scaled * rows[k, j]
-        for i in range(n):
-            is_free[i] = (x[i] > low[i] or gradient[i] < 0.0) and (
-                x[i] < high[i] or gradient[i] > 0.0
-            )
-        while True:  # what is at a bound must not leave it
-            _newton_step(hessian, gradient, is_free, step)
-            leaves = False
-            for i in range(n):
-                if (x[i] <= low[i] and step[i] < 0.0) or (x[i] >= high[i] and step[i] > 0.0):
-                    is_free[i], leaves = False, True
-            if not leaves:
-                break
-        longest, share = 0.0, 1.0
-        for i in range(n):
-            longest = max(longest, abs(step[i]))
-            if step[i] != 0.0:
-                bound = high[i] if step[i] > 0.0 else low[i]
-                share = min(share, (bound - x[i]) / step[i])
+        _expand(wanted, rows, least, weight, x, spare, gradient, hessian)
+        longest, share = _free_step(x, low, high, gradient, hessian, is_free, step)
         if longest <= _SHORTEST:
             return True
         for k in range(count):
@@ -90,6 +58,67 @@ def nearest_in_box(
         for i in range(n):
             x[i] = min(max(x[i] + share * step[i], low[i]), high[i])
     return False
+
+
+@compiled_part
+def _expand(
+    wanted: Array,
+    rows: Array,
+    least: Array,
+    weight: float,
+    x: Array,
+    spare: Array,
+    gradient: Array,
+    hessian: Array,
+) -> None:
+    """Write n_k · x - b_k (K,), gradient (n,) and the lower triangle of the Hessian (n, n)."""
+    n = x.size
+    for i in range(n):
+        gradient[i] = x[i] - wanted[i]
+        for j in range(i):
+            hessian[i, j] = 0.0
+        hessian[i, i] = 1.0
+    for k in range(spare.size):
+        left = -least[k]
+        for i in range(n):
+            left += rows[k, i] * x[i]
+        spare[k] = left
+        if left < 0.0:
+            for i in range(n):
+                scaled = weight * rows[k, i]
+                gradient[i] += scaled * left
+                for j in range(i + 1):
+                    hessian[i, j] += scaled * rows[k, j]
+
+
+@compiled_part
+def _free_step(
+    x: Array,
+    low: Array,
+    high: Array,
+    gradient: Array,
+    hessian: Array,
+    is_free: NDArray[np.bool_],
+    step: Array,
+) -> tuple[float, float]:
+    """Write a step that leaves no bound it is at; return its longest entry, and how far it goes."""
+    n = x.size
+    for i in range(n):
+        is_free[i] = (x[i] > low[i] or gradient[i] < 0.0) and (x[i] < high[i] or gradient[i] > 0.0)
+    leaves = True
+    while leaves:
+        _newton_step(hessian, gradient, is_free, step)
+        leaves = False
+        for i in range(n):
+            if (x[i] <= low[i] and step[i] < 0.0) or (x[i] >= high[i] and step[i] > 0.0):
+                is_free[i], leaves = False, True
+    longest, share = 0.0, 1.0
+    for i in range(n):
+        longest = max(longest, abs(step[i]))
+        if step[i] != 0.0:
+            bound = high[i] if step[i] > 0.0 else low[i]
+            share = min(share, (bound - x[i]) / step[i])
+    return longest, share
 
 
 @compiled_part

@@ -204,9 +204,7 @@ class DensityTracking:
         """
         numbers, rows = self._numbers, self._dynamics.rows
         wanted, limits = np.empty(self._arm.nv), self._arm.limits
-        is_off = _return(
-            numbers, rows, self._sample, self._gains.rate, limits.acceleration, wanted
-        )
+        is_off = _return(numbers, rows, self._sample, self._gains.rate, limits.acceleration, wanted)
         is_off |= self.is_moving and abs(1.0 - numbers[_RATE]) > _HANDED_OVER[1]
         wanted, gives_way = self._evasion.velocity(q, rows[AHEAD_VELOCITY], wanted)
         self.is_evading = gives_way or (self.is_evading and bool(is_off))

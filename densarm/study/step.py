@@ -35,7 +35,7 @@ _NEAREST = 0.02  # distance from a sphere to the arm, at least [m]
 _CANDIDATES = 50  # per sphere
 _FAR = (0.0, 0.0, 100.0)  # position of what is in nobody's way [m]
 _OFF_MOTION = 1e-3  # of the states in every joint [rad or m]
-_AWAY, _BACK_AGAIN = 0.2, 1.0  # way of a sphere that moves off the arm's base [m], and period [s]
+_AWAY, _BACK_AGAIN = (0.1, 0.3), 1.0  # [m] off its place that a sphere goes to and fro, and [s]
 # States between two turns: so many that the first of a turn, which finds nothing in the caches,
 # does not matter to the 99.9 %; no divisor of a visit to all, so that turns shift.
 _BLOCK = 4999
@@ -89,6 +89,8 @@ class StepTiming:
     """The whole `controller.torque` then, median [µs]; moving the spheres is not timed."""
     evading_ratio: float | None = None
     """The same in units of `step_us`."""
+    evading_percentiles_us: list[float] | None = None
+    """As `step_percentiles_us`, of these steps [µs]."""
 
 
 def time_step(
@@ -133,7 +135,10 @@ def time_step(
         block = list(islice(to_and_fro, min(_BLOCK, steps - begin)))
         for calls, of_calls, move in zip(turns, record, moves, strict=True):
             _time(calls, block, of_calls[:, begin:], move)
-    (step_us, bare_us, *evading), (step, bare) = 1e6 * np.median(record[:, 0], axis=1), record[:2, 1]
+    (step_us, bare_us, *evading), (step, bare) = (
+        1e6 * np.median(record[:, 0], axis=1),
+        record[:2, 1],
+    )
     least = np.full(min(steps, period), np.inf)
     np.minimum.at(least, np.arange(steps) % period, step)
     switches = record[0, 2]
@@ -156,6 +161,7 @@ def time_step(
         moving=moving,
         evading_us=float(evading[0]) if evading else None,
         evading_ratio=float(evading[0] / step_us) if evading else None,
+        evading_percentiles_us=_percentiles(record[2, 1]) if evading else None,
     )
 
 
@@ -246,7 +252,7 @@ def _rest(t: float) -> None:
 
 
 def _to_and_fro(world: World, moving: int) -> Callable[[float], None]:
-    """Return what moves the first spheres off the arm's base and back, at a time [s].
+    """Return what moves the first spheres away from the arm's base and back, at a time [s].
 
     Raises:
         InvalidValueError: fewer spheres.
@@ -256,13 +262,15 @@ def _to_and_fro(world: World, moving: int) -> Callable[[float], None]:
         raise InvalidValueError("moving", moving, f"at most {len(spheres)}, the spheres there are")
     names = [sphere.name for sphere in spheres[:moving]]
     places = np.array([sphere.position for sphere in spheres[:moving]])
-    ways = _AWAY * places / np.linalg.norm(places, axis=1, keepdims=True)
+    ways = places / np.linalg.norm(places, axis=1, keepdims=True)
+    begin, end = _AWAY
     rate = 2.0 * np.pi / _BACK_AGAIN
 
     def move(t: float) -> None:
-        share, speed = 0.5 * (1.0 - np.cos(rate * t)), 0.5 * rate * np.sin(rate * t)
+        off = begin + 0.5 * (end - begin) * (1.0 - np.cos(rate * t))
+        speed = 0.5 * (end - begin) * rate * np.sin(rate * t)
         for name, place, way in zip(names, places, ways, strict=True):
-            world.move_obstacle(name, place + share * way, velocity=speed * way)
+            world.move_obstacle(name, place + off * way, velocity=speed * way)
 
     return move
 

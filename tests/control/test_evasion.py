@@ -6,6 +6,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from scipy.optimize import linprog
 
+import densarm
 from densarm.arms.arm import Arm, load_arm
 from densarm.control.evasion import EVADING_GAIN, Evasion, EvasionParameters
 from densarm.control.regulation import DensityRegulation
@@ -111,6 +112,24 @@ def test_the_same_ball_hits_an_arm_that_does_not_see_it(
     crossing_runs: dict[type[Evasion], Run],
 ) -> None:
     assert crossing_runs[Blind].outcome == Outcome.COLLIDED
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("scenario", "clearance", "certified"),
+    [("panda_crossing", 0.012, False), ("panda_shared_table", 0.045, True)],
+)
+def test_scenarios_among_what_moves_are_reached(
+    scenario: str, clearance: float, certified: bool
+) -> None:
+    run = densarm.run(scenario)
+    assert (run.outcome, run.detail, run.replanned_at) == (Outcome.REACHED, "", ())
+    assert run.clearance.min() > clearance
+    checks = {check.name: check.holds for check in run.certificate.checks}
+    assert checks["swept"]
+    assert checks["replay"]
+    if certified:
+        assert run.certified
 
 
 @pytest.mark.slow
