@@ -284,9 +284,9 @@ def _density_rows(
     reaches: Array,
     table: Array,
 ) -> int:
-    """Write the rows of pairs awake, and how far those that stand are to be awake; return how many.
+    """Write rows that some velocity in reach may break, and how far what stands is to be awake.
 
-    Farther off no velocity in reach breaks a row. `reaches` are those of others, and as written.
+    `reaches` are reach as others have it, and as it was written last (2, K) [m].
     """
     margin, width, decay, extra, reaction = numbers
     count, n = 0, v.size
@@ -295,28 +295,30 @@ def _density_rows(
         fastest[j] = abs(v[j]) + _REACH_SHARE * limits[3, j] / EVADING_GAIN
         soonest = max(soonest, fastest[j] / (2.0 * _BRAKE_SHARE * limits[3, j]))
     for k in range(state.shape[0]):
+        closing, h = pair_motion(lipschitz, k, fastest), rows[k, 0] - margin
         if not is_moving[k]:
-            closing = pair_motion(lipschitz, k, fastest)
-            far = margin + (reaction + max(1.0 / _STANDING_RATE, soonest)) * closing
+            far = (reaction + max(1.0 / _STANDING_RATE, soonest)) * closing
             if reach[k] != reaches[1, k]:
                 reaches[0, k] = reach[k]
-            reach[k] = reaches[1, k] = max(reaches[0, k], min(far, margin + width))
-        h, rate = rows[k, 0] - margin, 0.0
-        if is_moving[k]:
-            rate = pair_rate(rows[k], twist[k])
-            h -= extra + reaction * max(-rate, 0.0)
-        if state[k] == 0 or h >= width:
-            continue
-        row = table[count]
-        speed = write_slope(rows[k], jacobian, sign[k], v, row)
-        if is_moving[k]:
-            slope = log_inverse_bump(max(h, _LEAST_SHARE * width), width, 0.0)[1]
-            row[n] = -decay / slope - rate - _RECOVERY * min(h, 0.0)
-        else:
-            brake = 0.0
+            reach[k] = reaches[1, k] = max(reaches[0, k], margin + min(far, width))
+            if state[k] == 0 or h >= far or h >= width:
+                continue
+            row, brake = table[count], 0.0
+            speed = write_slope(rows[k], jacobian, sign[k], v, row)
             for j in range(n):
                 brake += abs(row[j]) * limits[3, j]
             left = max(h - reaction * max(-speed, 0.0), 0.0)
             row[n] = -min(_STANDING_RATE * left, math.sqrt(2.0 * _BRAKE_SHARE * brake * left))
-        count += 1
+            count += 1
+        elif state[k] != 0:
+            rate = pair_rate(rows[k], twist[k])
+            h -= extra + reaction * max(-rate, 0.0)
+            if h >= width:
+                continue
+            slope = log_inverse_bump(max(h, _LEAST_SHARE * width), width, 0.0)[1]
+            least = -decay / slope - rate - _RECOVERY * min(h, 0.0)
+            if least > -closing:
+                write_slope(rows[k], jacobian, sign[k], v, table[count])
+                table[count, n] = least
+                count += 1
     return count
