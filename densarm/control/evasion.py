@@ -138,6 +138,11 @@ class Evasion:
             )
         return self._is_needed
 
+    @property
+    def sees_motion(self) -> bool:
+        """Whether any obstacle has a velocity now."""
+        return bool(self._world.twist.any())
+
     def velocity(self, q: Array, v: Array, nominal: Array) -> tuple[Array, bool]:
         """Return the velocity to follow (nv,) [rad/s or m/s], and whether it is an evading one.
 

@@ -78,7 +78,7 @@ class FieldRegulation:
         evasion: Evasion | None = None,
     ) -> None:
         self._arm, self._evasion = arm, evasion
-        self.is_evading = False
+        self._is_evading = False
         self._field = field
         self._speed_law = speed_law
         self._gain = gains.velocity
@@ -107,12 +107,17 @@ class FieldRegulation:
         metric = self._scale * self._dynamics.mass_matrix() if self._scale > 0.0 else None
         velocity = self._limited(q, metric)
         if self._evasion is not None and self._evasion.is_needed():
-            evading, self.is_evading = self._evasion.velocity(q, v, velocity)
-            if self.is_evading:
+            evading, self._is_evading = self._evasion.velocity(q, v, velocity)
+            if self._is_evading:
                 self._evasion.send_torque(self._dynamics, evading)
                 return np.array(self._dynamics.rows[TORQUE])
         wanted = self._dynamics.torque(-self._gain * v, self._gain * velocity)
         return self._filter.torque(t, self._dynamics, q, v, wanted, self._field.distances)
+
+    @property
+    def is_evading(self) -> bool:
+        """Whether an obstacle moves, and the arm gave way at the last call."""
+        return self._is_evading and self._evasion is not None and self._evasion.sees_motion
 
     @property
     def dynamics(self) -> InverseDynamics:
@@ -170,7 +175,6 @@ class DensityRegulation(FieldRegulation):
 
     Attributes:
         goal: as given (nq,), or where it has moved to.
-        is_evading: whether the arm gave way to what moves at the last call.
 
     Raises:
         InvalidValueError: a goal that touches something or is outside limits, or a density that is

@@ -25,11 +25,11 @@ class Replanning:
     or stands away from the goal with no reference left. The arm is then stopped along a straight
     line by a `Supervisor`; once it rests there is a new plan from there, up to three times.
     Nothing proves beforehand that the way to stop from a push is clear: feedback alone would chase
-    the reference across whatever is between. An arm that gives way to what moves (the controller's
-    `is_evading`) is not lost, however far off it is, and is never stopped: held still it would be
-    hit. Where it stands for as long as the patience there is a new plan at once, and without one it
-    goes on as it does. The call of `torque` that plans takes as long as planning does, with the arm
-    at rest.
+    the reference across whatever is between. While an arm gives way to what moves (`is_evading` of
+    the controller) it is not lost, however far off it is, and is not stopped: held still it would
+    be hit. Where it stands for as long as the patience there is a new plan at once, and without one
+    it goes on as it does. The call of `torque` that plans takes as long as planning does, with the
+    arm at rest.
 
     Args:
         arm: the arm.

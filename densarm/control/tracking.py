@@ -33,10 +33,7 @@ from densarm.density.navigation_density import (
     NavigationDensity,
     write_gauge_gradient,
 )
-from densarm.density.unsafe_sets import (
-    SensingParameters,
-    UnsafeSet,
-)
+from densarm.density.unsafe_sets import SensingParameters, UnsafeSet
 from densarm.planning.motion import Motion, MotionSample, write_sample
 from densarm.values.arrays import Array
 from densarm.values.kernels import compiled
@@ -103,7 +100,6 @@ class DensityTracking:
         motion: as given.
         goal: where it ends (nq,).
         tracking_error: largest |e| of a joint at the last call, zero before the first [rad or m].
-        is_evading: whether the arm gave way to what moves at the last call, or still returns.
 
     Raises:
         InvalidValueError: a density that is singular, flat or blended at e = 0.
@@ -129,7 +125,7 @@ class DensityTracking:
         self.motion = motion
         self.goal: Array = arm.configurations(motion.position[-1])
         self.tracking_error: float = 0.0
-        self.is_evading = False
+        self._is_evading = False
         self._arm = arm
         self._kinematics = Kinematics(arm)
         distance = goal_distance or TorusDistance(arm)
@@ -207,12 +203,17 @@ class DensityTracking:
         is_off = _return(numbers, rows, self._sample, self._gains.rate, limits.acceleration, wanted)
         is_off |= self.is_moving and abs(1.0 - numbers[_RATE]) > _HANDED_OVER[1]
         wanted, gives_way = self._evasion.velocity(q, rows[AHEAD_VELOCITY], wanted)
-        self.is_evading = gives_way or (self.is_evading and bool(is_off))
-        if self.is_evading:
+        self._is_evading = gives_way or (self._is_evading and bool(is_off))
+        if self._is_evading:
             numbers[_EMERGENCY] = 0.0
             rows[RATE_LIMIT] = numbers[_ELAPSED] * limits.torque_rate
             ahead = None if gives_way else rows[BRAKE]
             self._evasion.send_torque(self._dynamics, wanted, ahead)
+
+    @property
+    def is_evading(self) -> bool:
+        """Whether an obstacle moves, and the arm gave way at the last call, or still returns."""
+        return self._is_evading and self._evasion.sees_motion
 
     def pause(self) -> None:
         """Let the reference's clock come to rest, so that the arm rests on the motion."""
