@@ -44,8 +44,9 @@ def bench() -> None:
 @choice_option("--shapes", ["hull", "pieces", "capsule"], "The arm's collision geometry.")
 @number_option("--pairs", 64, "Geometry pairs: arm to sphere, filled up by the arm's own.")
 @number_option("--steps", 20_000, "Steps to be timed, at 1 kHz along a motion.")
+@number_option("--moving", 0, "Spheres that move in a third turn, which are evaded.", least=0)
 @output_option("--json", "FILE", "Write the result as JSON.")
-def step(arm: str, shapes: str, pairs: int, steps: int, json: Path | None) -> None:
+def step(arm: str, shapes: str, pairs: int, steps: int, moving: int, json: Path | None) -> None:
     """Time one control step of the density tracking controller.
 
     The whole `controller.torque` is compared with bare calls of Pinocchio and coal for the
@@ -64,7 +65,7 @@ def step(arm: str, shapes: str, pairs: int, steps: int, json: Path | None) -> No
         report("measuring")
         from densarm.study.step import time_first_calls, time_step
 
-        result = time_step(arm, shapes, pairs, steps)
+        result = time_step(arm, shapes, pairs, steps, moving)
         report("compiling in a new process")
         compiled, loaded = time_first_calls(arm, shapes, pairs)
         if json:
@@ -73,12 +74,16 @@ def step(arm: str, shapes: str, pairs: int, steps: int, json: Path | None) -> No
     click.echo(f"controller.torque  {result.step_us:.1f} µs")
     click.echo(f"bare calls         {result.bare_us:.1f} µs")
     click.echo(f"ratio              {result.ratio:.2f}")
+    if result.evading_us is not None:
+        ratio = f"{result.evading_ratio:.2f} of the step, {moving} spheres moving"
+        click.echo(f"evading            {result.evading_us:.1f} µs, {ratio}")
     click.echo(f"pairs              {result.pairs}")
     for name, times in (
         ("controller.torque", result.step_percentiles_us),
         ("  undisturbed", result.undisturbed_percentiles_us),
         ("  steady", result.steady_percentiles_us),
         ("bare calls", result.bare_percentiles_us),
+        ("evading", result.evading_percentiles_us),
     ):
         if times:
             at = ", ".join(f"{time:.1f}" for time in times)

@@ -3,21 +3,26 @@
 import math
 from dataclasses import dataclass
 
-import daqp
 import numpy as np
-import pinocchio as pin
 from numpy.typing import NDArray
 
 from densarm.control.disturbance_observer import AHEAD_VELOCITY
-from densarm.control.inverse_dynamics import ATTRACT, BRAKE, InverseDynamics, straight_torque
+from densarm.control.inverse_dynamics import (
+    ATTRACT,
+    BRAKE,
+    DynamicsArrays,
+    InverseDynamics,
+    straight_torque,
+)
+from densarm.control.misses import MissesAhead, write_slope
+from densarm.control.soft_rows import nearest_in_box
 from densarm.density.inverse_bump import log_inverse_bump
 from densarm.values.arrays import Array
 from densarm.values.checks import non_negative, positive
 from densarm.values.documented import documented
-from densarm.values.kernels import compiled, compiled_part
+from densarm.values.kernels import compiled
 from densarm.world.active_pairs import ActivePairs, pair_motion
-from densarm.world.distance_view import add_pair_gradient, pair_rate
-from densarm.world.pair_queries import PairQueries
+from densarm.world.distance_view import pair_rate
 from densarm.world.stopping import HELD_SHARE
 from densarm.world.world import World
 
@@ -26,17 +31,14 @@ EVADING_GAIN = 40.0
 
 _LIMIT_SHARE = 0.85  # of velocities and accelerations, since torque lags behind by its rate
 _TIMES = 6  # at which misses are looked for, one every other call in turn
-_LAG = 0.04  # [s] until a velocity that is asked for is reached
-_SOONEST = 0.03  # [s] in which a miss is made good
 _FASTEST = 1e3  # [rad/s or m/s], where joints have no limit
 _RECOVERY = 4.0  # [1/s] of a margin that is lost, and at which the way to a joint limit shrinks
 _STANDING_RATE = 10.0  # [1/s] at which the distance to what stands may shrink
 _BRAKE_SHARE = 0.5  # of the accelerations, that a stop before what stands reckons with
-_STANDING_WEIGHT = 10.0  # of what is known for sure, where not all rows can hold
-_SOFTNESS = 1e-4  # reciprocal weight of rows
+_REACH_SHARE = 1.1  # of what accelerations reach, since reach is of the next step
+_WEIGHT = 1e4  # of a row's lack [rad or m]
 _LEAST_SHARE = 1e-5  # of σ, of h where the bump is evaluated
-_MISS_REACH = 0.12  # [m] beyond which a miss is no row
-_UNBOUNDED = 1e30  # as daqp has it
+_LEAST_LEVER = 1e-9  # [m], of a row that some joint can do something about
 
 
 @documented
@@ -86,9 +88,9 @@ class Evasion:
     gradient that there, and τ_0 the time in which a velocity is reached. Times up to the horizon
     take turns. a_k is half of what the accelerations make along ∇h_k, so that the arm stops in time
     where it flees. Bounds on q̇ are those of velocities, of what accelerations reach within 1/K_v,
-    and of the way to joint limits. Rows are soft, since not all can hold at times: those of what
-    stands weigh ten times as much, bounds hold always. Rows that hold for all velocities in reach
-    are left out, and where q̇_nom keeps all there is no problem to solve.
+    and of the way to joint limits. Rows are soft, since not all can hold at times, each measured
+    along its gradient [rad/s or m/s]; bounds hold always. Rows that hold for all velocities in
+    reach are left out, and where q̇_nom keeps all there is no problem to solve.
 
     Args:
         world: the pairs; obstacles count as moving that have a motion, or were moved since now.
@@ -107,41 +109,45 @@ class Evasion:
         margin: float,
         parameters: EvasionParameters = EvasionParameters(),
     ) -> None:
-        arm, p, self._margin = world.arm, parameters, margin
+        arm, p = world.arm, parameters
         self._world, self._arm, self._pairs, self.parameters = world, arm, pairs, p
         self._version, self._way_before = 0, world.obstacle_way.copy()
-        self._is_moving = np.zeros(world.n_pairs, bool)
-        self._is_needed = False
+        self._is_moving, self._is_needed = np.zeros(world.n_pairs, bool), False
+        self._ahead = np.array([margin + p.margin + p.distance, p.reaction + p.horizon])
         n, size = arm.nv, (_TIMES + 1) * world.n_pairs
         # Blocks of rows of the density, and of misses at each time; how many in each; all in reach.
-        self._rows, self._chosen = np.zeros((size, n + 1)), np.zeros((size, n + 1))
-        self._count = np.zeros(_TIMES + 1, np.int64)
+        self._rows, self._count = np.zeros((size, n + 1)), np.zeros(_TIMES + 1, np.int64)
+        self._chosen = np.zeros((size, n + 1))
         self._turn, self._looks = 0, False
-        self._obstacle_of = world.pair_shapes[:, 1].tolist()
-        self._near = np.zeros(world.n_pairs, np.int64)
-        self._hessian, self._upper = np.eye(n), np.full(size, _UNBOUNDED)
-        self._sense = np.where(np.arange(n + size) < n, 0, 8).astype(np.int32)  # soft beyond bounds
-        self._data = arm.model.createData()
-        self._jacobian = self._data.J.reshape(6, n)
-        geometry = world.geometry_model
-        self._queries = PairQueries(arm.model, geometry, world.pair_shapes, remembers=False)
+        self._misses = MissesAhead(world, pairs, margin + p.miss)
         limits, turns = arm.limits, arm.continuous
         lower, upper = np.where(turns, -np.inf, limits.lower), np.where(turns, np.inf, limits.upper)
         speed = _LIMIT_SHARE * np.minimum(limits.velocity, _FASTEST)
         self._limits = np.array([lower, upper, speed, _LIMIT_SHARE * limits.acceleration])
+        self._reaches = np.full((2, world.n_pairs), np.nan)
         self._density = np.array([margin, p.distance, p.decay, p.margin, p.reaction])
+        self._most, self._none = HELD_SHARE * limits.acceleration, np.zeros(n)
 
     def is_needed(self) -> bool:
         """Return whether any obstacle moves, or was moved; pairs are awake in time from then on."""
-        world, p = self._world, self.parameters
+        world = self._world
         if world.version != self._version:
             self._version = world.version
-            self._is_moving[:] = (world.obstacle_way != self._way_before) | world.has_motion
-            self._is_needed = bool(self._is_moving.any())
-            if self._is_needed:
-                ahead = np.array([self._margin + p.margin + p.distance, p.reaction + p.horizon])
-                _widen(self._pairs.reach, self._is_moving, world.twist, ahead)
+            self._is_needed = _note_moving(
+                self._is_moving,
+                world.has_motion,
+                world.obstacle_way,
+                self._way_before,
+                world.twist,
+                self._ahead,
+                self._pairs.reach,
+            )
         return self._is_needed
+
+    @property
+    def sees_motion(self) -> bool:
+        """Whether any obstacle has a velocity now."""
+        return bool(self._world.twist.any())
 
     def velocity(self, q: Array, v: Array, nominal: Array) -> tuple[Array, bool]:
         """Return the velocity to follow (nv,) [rad/s or m/s], and whether it is an evading one.
@@ -151,36 +157,22 @@ class Evasion:
             v: velocity (nv,) [rad/s or m/s].
             nominal: q̇_nom (nv,), of which only what the bounds allow is returned.
         """
-        angles, n = self._arm.angles(q), self._arm.nv
-        low, high, wanted = _bounds(angles, v, nominal, self._limits)
+        angles, found = self._arm.angles(q), np.empty(self._arm.nv)
         self._write_rows(q, v, angles)
-        some, holds = _in_reach(self._rows, self._count, low, high, wanted, self._chosen)
-        if holds:
-            return wanted, False
-        slopes, bounds = self._chosen[:some, :n].copy(), self._chosen[:some, n]
-        found, _, flag, _ = daqp.solve(
-            self._hessian,
-            -nominal,
-            slopes,
-            np.append(high, self._upper[:some]),
-            np.append(low, bounds),
-            self._sense[: n + some],
-            rho_soft=_SOFTNESS,
+        gives_way = _nearest(
+            angles, v, nominal, self._limits, self._rows, self._count, self._chosen, found
         )
-        return (np.clip(found, low, high) if flag > 0 else np.clip(0.0, low, high)), True
+        return found, gives_way
 
     def send_torque(
-        self, dynamics: InverseDynamics, wanted: Array, ahead: Array | float = 0.0
+        self, dynamics: InverseDynamics, wanted: Array, ahead: Array | None = None
     ) -> None:
         """Send the torque that leads to a velocity (nv,), by K_v and an acceleration (nv,) ahead.
 
         Accelerations are kept within their limits, before the torque rate of the dynamics.
         """
-        rows = dynamics.rows
-        acceleration = EVADING_GAIN * (wanted - rows[AHEAD_VELOCITY]) + ahead
-        most = HELD_SHARE * self._arm.limits.acceleration
-        rows[ATTRACT], rows[BRAKE] = np.clip(acceleration, -most, most), 0.0
-        straight_torque(dynamics.arrays)
+        ahead = self._none if ahead is None else ahead
+        _send(dynamics.arrays, wanted, ahead, self._most)
 
     def _write_rows(self, q: Array, v: Array, angles: Array) -> None:
         """Write ∇h · q̇ ≥ b of all rows, [∇h, b] (nv + 1,), in blocks of the number of pairs."""
@@ -195,138 +187,88 @@ class Evasion:
             self._density,
             v,
             self._limits,
+            world.lipschitz,
+            pairs.reach,
+            self._reaches,
             self._rows,
         )
         self._looks = not self._looks and horizon > 0.0
         if self._looks:
             self._turn = self._turn % _TIMES + 1
-            self._count[self._turn] = self._look_ahead(v, angles, horizon * self._turn / _TIMES)
-
-    def _look_ahead(self, v: Array, angles: Array, ahead: float) -> int:
-        """Write the rows of misses in some time [s], and return how many."""
-        world, pairs, arm = self._world, self._pairs, self._arm
-        miss, way = self._margin + self.parameters.miss, np.abs(v) * ahead
-        reach = np.array([miss + _MISS_REACH, ahead])
-        n = _may_meet(
-            pairs.state,
-            pairs.rows,
-            self._is_moving,
-            world.lipschitz,
-            world.twist,
-            way,
-            reach,
-            self._near,
-        )
-        if not n:
-            return 0
-        near, data = self._near[:n], self._queries.data
-        there = np.minimum(np.maximum(angles + ahead * v, self._limits[0]), self._limits[1])
-        pin.computeJointJacobians(arm.model, self._data, arm.configurations(there))
-        pin.updateGeometryPlacements(arm.model, self._data, world.geometry_model, data)
-        for shape, k in {self._obstacle_of[k]: k for k in near.tolist()}.items():
-            data.oMg[shape] = _pose_ahead(data.oMg[shape], world.twist[k], ahead)
-        self._queries.ask(near)
-        begin, soon = self._turn * world.n_pairs, max(ahead - _LAG, _SOONEST)
-        numbers, rows = np.array([miss, soon]), self._queries.rows
-        return int(
-            _miss_rows(near, rows, self._jacobian, world.sign, v, numbers, self._rows[begin:])
-        )
-
-
-def _pose_ahead(pose: pin.SE3, twist: Array, ahead: float) -> pin.SE3:
-    """Return where a body is in some time [s], of a velocity as in `ChangingObstacles.twist`."""
-    linear, angular = twist[:3], twist[3:]
-    if not angular.any():
-        return pin.SE3(pose.rotation, pose.translation + ahead * linear)
-    moved = pose.translation + ahead * (linear + np.cross(angular, pose.translation))
-    return pin.SE3(pin.exp3(ahead * angular) @ pose.rotation, moved)
+            ahead, table = horizon * self._turn / _TIMES, self._rows[self._turn * world.n_pairs :]
+            self._count[self._turn] = self._misses.write(
+                self._is_moving, angles, v, self._limits, ahead, table
+            )
 
 
 @compiled
-def _widen(reach: Array, is_moving: NDArray[np.bool_], twist: Array, ahead: Array) -> None:
+def _note_moving(
+    is_moving: NDArray[np.bool_],
+    has_motion: NDArray[np.bool_],
+    way: Array,
+    way_before: Array,
+    twist: Array,
+    ahead: Array,
+    reach: Array,
+) -> bool:
+    """Note which pairs have an obstacle that moves, widen their reach, and return if any has."""
+    some = False
     for k in range(reach.shape[0]):
-        far = ahead[0]
+        is_moving[k] = has_motion[k] or way[k] != way_before[k]
+        some |= is_moving[k]
         if is_moving[k]:
-            far += ahead[1] * math.sqrt(twist[k, 0] ** 2 + twist[k, 1] ** 2 + twist[k, 2] ** 2)
-        reach[k] = max(reach[k], far)
+            speed = math.sqrt(twist[k, 0] ** 2 + twist[k, 1] ** 2 + twist[k, 2] ** 2)
+            reach[k] = max(reach[k], ahead[0] + ahead[1] * speed)
+    return some
 
 
 @compiled
-def _bounds(angles: Array, v: Array, nominal: Array, limits: Array) -> tuple[Array, Array, Array]:
-    n = v.size
-    low, high, wanted = np.empty(n), np.empty(n), np.empty(n)
+def _nearest(
+    angles: Array,
+    v: Array,
+    nominal: Array,
+    limits: Array,
+    rows: Array,
+    count: NDArray[np.int64],
+    chosen: Array,
+    found: Array,
+) -> bool:
+    """Write the velocity within the bounds that the rows ask for; return whether they do so."""
+    some, holds, n = 0, True, v.size
+    low, high = np.empty(n), np.empty(n)
     for i in range(n):
         change, most = limits[3, i] / EVADING_GAIN, limits[2, i]
         least = -min(most, _RECOVERY * max(angles[i] - limits[0, i], 0.0))
         most = min(most, _RECOVERY * max(limits[1, i] - angles[i], 0.0))
         low[i] = min(max(least, v[i] - change), v[i] + change)
         high[i] = min(max(most, v[i] - change), v[i] + change)
-        wanted[i] = min(max(nominal[i], low[i]), high[i])
-    return low, high, wanted
-
-
-@compiled
-def _in_reach(
-    rows: Array, count: NDArray[np.int64], low: Array, high: Array, wanted: Array, chosen: Array
-) -> tuple[int, bool]:
-    """Choose rows that some velocity in reach breaks; return how many, and if none is broken."""
-    some, holds, n = 0, True, low.size
+        found[i] = min(max(nominal[i], low[i]), high[i])
     size = rows.shape[0] // count.size
     for block in range(count.size):
         for k in range(block * size, block * size + count[block]):
-            least, now = 0.0, 0.0
+            least, now, lever = 0.0, 0.0, 0.0
             for j in range(n):
                 slope = rows[k, j]
                 least += slope * (low[j] if slope > 0.0 else high[j])
-                now += slope * wanted[j]
-            if least < rows[k, n]:
+                now += slope * found[j]
+                lever += slope * slope
+            if least < rows[k, n] and lever > _LEAST_LEVER**2:
                 holds &= now >= rows[k, n]
                 for j in range(n + 1):
-                    chosen[some, j] = rows[k, j]
+                    chosen[some, j] = rows[k, j] / math.sqrt(lever)
                 some += 1
-    return some, holds
+    if not holds:
+        nearest_in_box(nominal, chosen[:some, :n], chosen[:some, n], low, high, _WEIGHT, found)
+    return not holds
 
 
 @compiled
-def _may_meet(
-    state: NDArray[np.int64],
-    rows: Array,
-    is_moving: NDArray[np.bool_],
-    lipschitz: Array,
-    twist: Array,
-    way: Array,
-    reach: Array,
-    near: NDArray[np.int64],
-) -> int:
-    count = 0
-    for k in range(state.shape[0]):
-        if state[k] == 0 or not is_moving[k]:
-            continue
-        speed = math.sqrt(twist[k, 0] ** 2 + twist[k, 1] ** 2 + twist[k, 2] ** 2)
-        if rows[k, 0] - speed * reach[1] - pair_motion(lipschitz, k, way) < reach[0]:
-            near[count] = k
-            count += 1
-    return count
-
-
-@compiled
-def _miss_rows(
-    near: NDArray[np.int64],
-    rows: Array,
-    jacobian: Array,
-    sign: Array,
-    v: Array,
-    numbers: Array,
-    table: Array,
-) -> int:
-    count, n = 0, v.size
-    for k in near:
-        h = rows[k, 0] - numbers[0]
-        if h <= _MISS_REACH:
-            table[count, n] = _write_slope(rows[k], jacobian, sign[k], v, table[count])
-            table[count, n] -= h / numbers[1]
-            count += 1
-    return count
+def _send(arrays: DynamicsArrays, wanted: Array, ahead: Array, most: Array) -> None:
+    rows = arrays[3]
+    for i in range(most.size):
+        a = EVADING_GAIN * (wanted[i] - rows[AHEAD_VELOCITY, i]) + ahead[i]
+        rows[ATTRACT, i], rows[BRAKE, i] = min(max(a, -most[i]), most[i]), 0.0
+    straight_torque(arrays)
 
 
 @compiled
@@ -340,41 +282,46 @@ def _density_rows(
     numbers: Array,
     v: Array,
     limits: Array,
+    lipschitz: Array,
+    reach: Array,
+    reaches: Array,
     table: Array,
 ) -> int:
+    """Write rows that some velocity in reach may break, and how far what stands is to be awake.
+
+    `reaches` are reach as others have it, and as it was written last (2, K) [m].
+    """
     margin, width, decay, extra, reaction = numbers
     count, n = 0, v.size
+    fastest, soonest = np.empty(n), 0.0
+    for j in range(n):
+        fastest[j] = abs(v[j]) + _REACH_SHARE * limits[3, j] / EVADING_GAIN
+        soonest = max(soonest, fastest[j] / (2.0 * _BRAKE_SHARE * limits[3, j]))
     for k in range(state.shape[0]):
-        h, rate = rows[k, 0] - margin, 0.0
-        if is_moving[k]:
-            rate = pair_rate(rows[k], twist[k])
-            h -= extra + reaction * max(-rate, 0.0)
-        if state[k] == 0 or h >= width:
-            continue
-        row = table[count]
-        speed = _write_slope(rows[k], jacobian, sign[k], v, row)
-        if is_moving[k]:
-            slope = log_inverse_bump(max(h, _LEAST_SHARE * width), width, 0.0)[1]
-            row[n] = -decay / slope - rate - _RECOVERY * min(h, 0.0)
-        else:
-            brake = 0.0
+        closing, h = pair_motion(lipschitz, k, fastest), rows[k, 0] - margin
+        if not is_moving[k]:
+            far = (reaction + max(1.0 / _STANDING_RATE, soonest)) * closing
+            if reach[k] != reaches[1, k]:
+                reaches[0, k] = reach[k]
+            reach[k] = reaches[1, k] = max(reaches[0, k], margin + min(far, width))
+            if state[k] == 0 or h >= far or h >= width:
+                continue
+            row, brake = table[count], 0.0
+            speed = write_slope(rows[k], jacobian, sign[k], v, row)
             for j in range(n):
                 brake += abs(row[j]) * limits[3, j]
             left = max(h - reaction * max(-speed, 0.0), 0.0)
             row[n] = -min(_STANDING_RATE * left, math.sqrt(2.0 * _BRAKE_SHARE * brake * left))
-            for j in range(n + 1):
-                row[j] *= _STANDING_WEIGHT
-        count += 1
+            count += 1
+        elif state[k] != 0:
+            rate = pair_rate(rows[k], twist[k])
+            h -= extra + reaction * max(-rate, 0.0)
+            if h >= width:
+                continue
+            slope = log_inverse_bump(max(h, _LEAST_SHARE * width), width, 0.0)[1]
+            least = -decay / slope - rate - _RECOVERY * min(h, 0.0)
+            if least > -closing:
+                write_slope(rows[k], jacobian, sign[k], v, table[count])
+                table[count, n] = least
+                count += 1
     return count
-
-
-@compiled_part
-def _write_slope(distance: Array, jacobian: Array, sign: Array, v: Array, row: Array) -> float:
-    """Write the gradient of a distance, and return how fast the arm changes it [m/s]."""
-    speed, n = 0.0, v.size
-    for j in range(n):
-        row[j] = 0.0
-    add_pair_gradient(distance, jacobian, sign, 1.0, row[:n])
-    for j in range(n):
-        speed += row[j] * v[j]
-    return speed

@@ -303,7 +303,7 @@ def robust_torque(gain: float, elapsed: float, late: float, arrays: DynamicsArra
         rows[TORQUE, i] = _clipped(tau, rows[EFFORT_LIMIT, i])
 
 
-@compiled
+@compiled_part
 def straight_torque(arrays: DynamicsArrays) -> None:
     """Write and send the torque of two accelerations, the rows `BRAKE` and `ATTRACT`."""
     mass, nonlinear, rows = arrays[0], arrays[1], arrays[3]

@@ -85,6 +85,7 @@ class FieldRegulation:
         evasion: Evasion | None = None,
     ) -> None:
         self._arm, self._evasion = arm, evasion
+        self._is_evading = False
         self._field = field
         self._speed_law = speed_law
         self._gain = gains.velocity
@@ -116,8 +117,8 @@ class FieldRegulation:
         metric = self._scale * self._dynamics.mass_matrix() if self._scale > 0.0 else None
         velocity = self._limited(q, metric)
         if self._evasion is not None and self._evasion.is_needed():
-            evading, gives_way = self._evasion.velocity(q, v, velocity)
-            if gives_way:
+            evading, self._is_evading = self._evasion.velocity(q, v, velocity)
+            if self._is_evading:
                 self._evasion.send_torque(self._dynamics, evading)
                 tau = np.array(self._dynamics.rows[TORQUE])
                 a = self._filter.acceleration(q, v, tau + self._dynamics.disturbance)
@@ -143,6 +144,11 @@ class FieldRegulation:
         mass[diagonal] = own + floor
         dynamics.update(t, q, v)
         mass[diagonal] = own
+
+    @property
+    def is_evading(self) -> bool:
+        """Whether an obstacle moves, and the arm gave way at the last call."""
+        return self._is_evading and self._evasion is not None and self._evasion.sees_motion
 
     @property
     def dynamics(self) -> InverseDynamics:

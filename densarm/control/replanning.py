@@ -25,8 +25,11 @@ class Replanning:
     or stands away from the goal with no reference left. The arm is then stopped along a straight
     line by a `Supervisor`; once it rests there is a new plan from there, up to three times.
     Nothing proves beforehand that the way to stop from a push is clear: feedback alone would chase
-    the reference across whatever is between. The call of `torque` that plans takes as long as
-    planning does, with the arm held at rest.
+    the reference across whatever is between. While an arm gives way to what moves (`is_evading` of
+    the controller) it is not lost, however far off it is, and is not stopped: held still it would
+    be hit. Where it stands for as long as the patience there is a new plan at once, and without one
+    it goes on as it does. The call of `torque` that plans takes as long as planning does, with the
+    arm at rest.
 
     Args:
         arm: the arm.
@@ -95,23 +98,27 @@ class Replanning:
 
     def _watch(self, t: float, q: Array) -> None:
         supervisor = self._supervisor
-        if supervisor.status.fault == Fault.NONE:
-            if self._has_lost(t, q):
-                supervisor.stop()
-        elif supervisor.is_at_rest:
-            controller = self._plan_again(q)
-            if controller is None:
-                self._gave_up = True
-                return
-            supervisor.resume(controller)
-            self._began, self._stood = t, None
-            self.replanned_at += (t,)
+        acts = supervisor.status.fault == Fault.NONE
+        evades = acts and bool(getattr(supervisor.controller, "is_evading", False))
+        if not (self._has_lost(t, q, evades) if acts else supervisor.is_at_rest):
+            return
+        if acts and not evades:
+            supervisor.stop()
+            return
+        self._stood = None
+        controller = self._plan_again(q)
+        if controller is None:
+            self._gave_up = not evades
+            return
+        supervisor.resume(controller)
+        self._began = t
+        self.replanned_at += (t,)
 
-    def _has_lost(self, t: float, q: Array) -> bool:
+    def _has_lost(self, t: float, q: Array, evades: bool) -> bool:
         motion, moves = self._supervisor.motion, self._supervisor.is_moving
         if moves is None:
             moves = motion is not None and t - self._began <= motion.duration
-        if moves:
+        if moves and not evades:
             return (self._supervisor.tracking_error or 0.0) > _LOST
         if self._stood is None or self._error(self._stood[1], q) > _STANDING:
             self._stood = t, q.copy()

@@ -37,11 +37,8 @@ from densarm.density.navigation_density import (
     NavigationDensity,
     write_gauge_gradient,
 )
-from densarm.density.unsafe_sets import (
-    SensingParameters,
-    UnsafeSet,
-)
-from densarm.planning.motion import Motion, MotionSample, write_sample
+from densarm.density.unsafe_sets import SensingParameters, UnsafeSet
+from densarm.planning.motion import Motion, write_sample
 from densarm.values.arrays import Array
 from densarm.values.kernels import compiled, compiled_part
 from densarm.world.active_pairs import ActivePairs
@@ -132,6 +129,7 @@ class DensityTracking:
         self.motion = motion
         self.goal: Array = arm.configurations(motion.position[-1])
         self.tracking_error: float = 0.0
+        self._is_evading = False
         self._arm = arm
         self._kinematics = Kinematics(arm)
         distance = goal_distance or TorusDistance(arm)
@@ -144,7 +142,7 @@ class DensityTracking:
             self.velocity(0.0, self.goal, np.zeros(arm.nv))
             return
         unlimited = np.full(arm.nv, math.inf)
-        self._evasion, self._is_evading = evasion(world, pairs.pairs, motion.margin), False
+        self._evasion = evasion(world, pairs.pairs, motion.margin)
         self._dynamics = InverseDynamics(arm, unlimited, self._kinematics, motion.period, actuation)
         kappa = distance.kappa if isinstance(distance, TorusDistance) else math.nan
         self._has_own_distance = math.isnan(kappa)
@@ -170,8 +168,9 @@ class DensityTracking:
         self._dynamics.compute_terms(q, v)
         self._density.update_psi(q)
         self._act(float(t), q, v)
-        if self._has_own_distance:  # asked again for the time of the reference that is known now
-            self._dynamics.rows[ATTRACT] = self._attraction(q, self._ahead().position)
+        if self._has_own_distance:  # asked again for the reference's time that is known now
+            ahead = self.reference_time + self._numbers[_DELAY] * self._numbers[_RATE]
+            self._dynamics.rows[ATTRACT] = self._attraction(q, self.motion.sample(ahead).position)
             self._act(float(t), q, v)
         if self._evasion.is_needed():
             self._evade(q)
@@ -190,21 +189,22 @@ class DensityTracking:
 
         It returns no faster than it can stop, and hands over where little is left to return.
         """
-        numbers, rows, sample = self._numbers, self._dynamics.rows, self._sample
-        error, follow = sample[_ERROR], numbers[_RATE] * sample[_VELOCITY]
-        off = np.abs(error)
-        stopping = np.sqrt(_EVADED_SHARE * self._arm.limits.acceleration * off)
-        back = np.copysign(np.minimum(self._gains.rate * off, stopping), error)
-        v = rows[AHEAD_VELOCITY]
-        wanted, gives_way = self._evasion.velocity(q, v, follow - back)
-        is_off = off.max() > _HANDED_OVER[0] or np.abs(v - follow).max() > _HANDED_OVER[1]
+        numbers, rows = self._numbers, self._dynamics.rows
+        wanted, limits = np.empty(self._arm.nv), self._arm.limits
+        is_off = _return(numbers, rows, self._sample, self._gains.rate, limits.acceleration, wanted)
         is_off |= self.is_moving and abs(1.0 - numbers[_RATE]) > _HANDED_OVER[1]
+        wanted, gives_way = self._evasion.velocity(q, rows[AHEAD_VELOCITY], wanted)
         self._is_evading = gives_way or (self._is_evading and bool(is_off))
         if self._is_evading:
             numbers[_EMERGENCY] = 0.0
             rows[RATE_LIMIT] = self._dynamics.elapsed * rows[TORQUE_RATE]
-            ahead = 0.0 if gives_way else rows[BRAKE]
+            ahead = None if gives_way else rows[BRAKE]
             self._evasion.send_torque(self._dynamics, wanted, ahead)
+
+    @property
+    def is_evading(self) -> bool:
+        """Whether an obstacle moves, and the arm gave way at the last call, or still returns."""
+        return self._is_evading and self._evasion.sees_motion
 
     def pause(self) -> None:
         """Let the reference's clock come to rest, so that the arm rests on the motion."""
@@ -277,11 +277,6 @@ class DensityTracking:
         """As `Motion.remark`."""
         return self.motion.remark
 
-    def _ahead(self) -> MotionSample:
-        """Return the reference when a torque sent now acts."""
-        numbers = self._numbers
-        return self.motion.sample(numbers[_TIME] + numbers[_DELAY] * numbers[_RATE])
-
     def _attraction(self, q: Array, wanted: Array) -> Array:
         """Return ∇ρ (nv,) at q (nq,) towards joint positions (nv,), and keep the error."""
         density, attract = self._density, np.empty(self._arm.nv)
@@ -295,15 +290,13 @@ class DensityTracking:
 _POSITION, _VELOCITY, _ACCELERATION, _ERROR, _WEIGHTS, _MOST = 0, 1, 2, 3, 4, 5  # rows of a sample
 
 # Numbers of the kernel: the reference's time σ, how far it is behind, and its derivatives, which
-# are kept as they were at the last time that the kernel was asked for.
+# are kept as they were at the last time asked for.
 _TIME, _LAG, _RATE, _CHANGE, _EMERGENCY, _LAST, _GOES_ON_FROM = 0, 1, 2, 3, 4, 5, 6
 _PERIOD, _DELAY, _KAPPA, _POSITION_GAIN, _VELOCITY_GAIN, _WANTED_RATE = 7, 8, 9, 10, 11, 12
-_N_NUMBERS = 13
-_KEPT = _N_NUMBERS - _LAG
+_N_NUMBERS, _KEPT = 13, 12  # how many, and how far behind the clock its copy is
 
 _EVADED_SHARE = 0.5  # of twice the acceleration limits, with which a return to the reference stops
 _HANDED_OVER = 0.001, 0.02  # of error, and of velocity or rate, that tracking takes over from
-
 _CLOCK_RATE = 20.0  # ω [1/s]
 _PAUSE_SHARE = 0.95  # of the acceleration limits, that pausing takes with the motion
 _PAUSED = 0.01  # σ̇ below which the reference counts as at rest
@@ -313,6 +306,22 @@ _LEAST_SHARE = 0.1  # of torque that counts as left
 _RETURN_SHARE = 0.25  # of the velocity limits, at which an arm returns from a push
 _PUSHED, _RETURNED = 0.5, 0.05  # velocity off by a push [rad/s or m/s], error after it [rad or m]
 _LARGEST_GAIN = 0.4  # of K_v times the time that a torque is late
+
+
+@compiled
+def _return(
+    numbers: Array, rows: Array, sample: Array, gain: float, most: Array, wanted: Array
+) -> bool:
+    """Write the velocity back to the reference; return whether the arm is off it."""
+    rate, is_off = numbers[_RATE], False
+    for i in range(most.size):
+        error, follow = sample[_ERROR, i], rate * sample[_VELOCITY, i]
+        off = abs(error)
+        back = math.copysign(min(gain * off, math.sqrt(_EVADED_SHARE * most[i] * off)), error)
+        wanted[i] = follow - back
+        is_off |= off > _HANDED_OVER[0]
+        is_off |= abs(rows[AHEAD_VELOCITY, i] - follow) > _HANDED_OVER[1]
+    return is_off
 
 
 @compiled
@@ -339,8 +348,7 @@ def _tracking_torque(
     u = (numbers[_TIME] + rate * numbers[_DELAY]) / period
     write_sample(u, u + 0.5 * rate * elapsed / period, period, knots, sample)
     error, attract, largest, left, n = sample[_ERROR], rows[ATTRACT], 0.0, 1.0, nonlinear.size
-    fastest = 0.0
-    slowest = -math.inf  # that σ̈ may be, for accelerations to keep their limits
+    fastest, slowest = 0.0, -math.inf  # the latter of σ̈, for accelerations to keep their limits
     for i in range(n):
         off = rows[AHEAD_ANGLE, i] - sample[_POSITION, i]
         if joint_index[1, i]:

@@ -145,7 +145,9 @@ class ClearanceSet:
         pairs = self.pairs
         if self._version != self.world.version and self._moving is not None:
             self._version = self.world.version
-            if np.count_nonzero(self._is_moving()) != self._n_moving:
+            world = self.world
+            now = _count_moving(world.obstacle_way, self._way_before, world.has_motion)
+            if now != self._n_moving:
                 self.set_sensing_distance(self._standing)
         pairs.update(q)
         return _add_active_log_bumps(*self._arrays, theta, out_gradient)
@@ -257,6 +259,14 @@ class ImplicitSet:
             t = max(h / (h - s), 0.0)
             out_gradient += slope * ((1.0 - t) * h_gradient + t * s_gradient)
         return value
+
+
+@compiled
+def _count_moving(way: Array, before: Array, has_motion: NDArray[np.bool_]) -> int:
+    count = 0
+    for k in range(way.shape[0]):
+        count += has_motion[k] or way[k] != before[k]
+    return count
 
 
 @compiled

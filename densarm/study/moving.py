@@ -91,6 +91,7 @@ class DamperEvasion(Evasion):
 
     def _write_rows(self, q: Array, v: Array, angles: Array) -> None:  # noqa: ARG002
         pairs, world, n = self._pairs, self._world, self._arm.nv
+        np.maximum(pairs.reach, _DAMPER_REACH, out=pairs.reach)
         near = np.flatnonzero((pairs.state != 0) & (pairs.rows[:, 0] < _DAMPER_REACH))
         rows, table = np.ascontiguousarray(pairs.rows[near]), self._rows[: len(near)]
         slopes = np.zeros((len(near), n))

@@ -23,7 +23,7 @@ from densarm.planning.motion import Motion
 from densarm.scene.obstacles import Sphere
 from densarm.scene.scene import Scene
 from densarm.values.arrays import Array
-from densarm.values.checks import positive_integer
+from densarm.values.checks import non_negative_integer, positive_integer
 from densarm.world.pair_queries import COAL_TOLERANCE
 from densarm.world.world import World
 
@@ -35,6 +35,7 @@ _NEAREST = 0.02  # distance from a sphere to the arm, at least [m]
 _CANDIDATES = 50  # per sphere
 _FAR = (0.0, 0.0, 100.0)  # position of what is in nobody's way [m]
 _OFF_MOTION = 1e-3  # of the states in every joint [rad or m]
+_AWAY, _BACK_AGAIN = (0.1, 0.3), 1.0  # [m] off its place that a sphere goes to and fro, and [s]
 # States between two turns: so many that the first of a turn, which finds nothing in the caches,
 # does not matter to the 99.9 %; no divisor of a visit to all, so that turns shift.
 _BLOCK = 4999
@@ -82,9 +83,19 @@ class StepTiming:
     """By how much the process's peak memory grew during the steps [kB]."""
     collections: int
     """Runs of Python's garbage collector during the steps."""
+    moving: int = 0
+    """How many of the spheres move in a third turn, in which the arm evades."""
+    evading_us: float | None = None
+    """The whole `controller.torque` then, median [µs]; moving the spheres is not timed."""
+    evading_ratio: float | None = None
+    """The same in units of `step_us`."""
+    evading_percentiles_us: list[float] | None = None
+    """As `step_percentiles_us`, of these steps [µs]."""
 
 
-def time_step(arm: str, shapes: str = "hull", pairs: int = 64, steps: int = 20_000) -> StepTiming:
+def time_step(
+    arm: str, shapes: str = "hull", pairs: int = 64, steps: int = 20_000, moving: int = 0
+) -> StepTiming:
     """Time one control step of the tracking controller.
 
     The arm swings to and fro among spheres that it passes closely, at 1 kHz, so that pairs wake
@@ -95,29 +106,39 @@ def time_step(arm: str, shapes: str = "hull", pairs: int = 64, steps: int = 20_0
         shapes: "hull", "pieces" or "capsule".
         pairs: geometry pairs: arm to sphere, filled up by the arm's own.
         steps: number of steps to be timed.
+        moving: how many of the spheres move in a third turn, up to 0.6 m/s; zero for none.
 
     Raises:
         UnknownNameError: no such arm or shapes.
-        InvalidValueError: a number of pairs that the arm cannot have, or of steps below 1.
+        InvalidValueError: a number of pairs that the arm cannot have, of steps below 1, or of
+            spheres that there are not.
     """
-    steps = positive_integer("steps", steps)
+    steps, moving = positive_integer("steps", steps), non_negative_integer("moving", moving)
     loaded = load_arm(arm, shapes=shapes)
     motion = swing(loaded)
     world = world_among_spheres(loaded, motion, pairs)
-    turns: tuple[Step, Step] = full_sensing_controller(world, motion).torque, _bare_calls(world)
+    turns: list[Step] = [full_sensing_controller(world, motion).torque, _bare_calls(world)]
+    moves: list[Callable[[float], object]] = [_rest, _rest]
+    if moving:
+        around = world_among_spheres(loaded, motion, pairs)
+        turns.append(full_sensing_controller(around, motion, moving).torque)
+        moves.append(_to_and_fro(around, moving))
     times = motion.period * np.arange(len(motion.position))
     q = loaded.configurations(motion.position + _OFF_MOTION)
     states = list(zip(times.tolist(), q, motion.velocity, strict=True))
     period, to_and_fro = 2 * len(states), cycle([*states, *states[::-1]])
-    record = np.full((2, 3, steps), np.nan)  # pages are touched here
-    for calls in turns:  # to warm up
-        _time(calls, states, np.empty((3, len(states))))
+    record = np.full((len(turns), 3, steps), np.nan)  # pages are touched here
+    for calls, move in zip(turns, moves, strict=True):  # to warm up
+        _time(calls, states, np.empty((3, len(states))), move)
     memory, collections = _peak_memory(), _collections()
     for begin in range(0, steps, _BLOCK):
         block = list(islice(to_and_fro, min(_BLOCK, steps - begin)))
-        for calls, of_calls in zip(turns, record, strict=True):
-            _time(calls, block, of_calls[:, begin:])
-    (step_us, bare_us), (step, bare) = 1e6 * np.median(record[:, 0], axis=1), record[:, 1]
+        for calls, of_calls, move in zip(turns, record, moves, strict=True):
+            _time(calls, block, of_calls[:, begin:], move)
+    (step_us, bare_us, *evading), (step, bare) = (
+        1e6 * np.median(record[:, 0], axis=1),
+        record[:2, 1],
+    )
     least = np.full(min(steps, period), np.inf)
     np.minimum.at(least, np.arange(steps) % period, step)
     switches = record[0, 2]
@@ -137,6 +158,10 @@ def time_step(arm: str, shapes: str = "hull", pairs: int = 64, steps: int = 20_0
         switches=int(switches.sum()),
         memory_growth_kb=_peak_memory() - memory,
         collections=_collections() - collections,
+        moving=moving,
+        evading_us=float(evading[0]) if evading else None,
+        evading_ratio=float(evading[0] / step_us) if evading else None,
+        evading_percentiles_us=_percentiles(record[2, 1]) if evading else None,
     )
 
 
@@ -199,16 +224,17 @@ def world_among_spheres(arm: Arm, motion: Motion, pairs: int) -> World:
     return World(arm, scene)
 
 
-def full_sensing_controller(world: World, motion: Motion) -> DensityTracking:
+def full_sensing_controller(world: World, motion: Motion, moving: int = 0) -> DensityTracking:
     """Return a controller that senses every obstacle as far as it does by default.
 
     Sensing distances are a share of what the motion keeps from an obstacle; these come when the
-    controller has been made, and are left where they were.
+    controller has been made, and are left where they were. Where some are to move, those alone do,
+    and the controller evades them.
     """
     scene = world.scene
-    for obstacle in scene:
+    for obstacle in scene.obstacles[:moving] if moving else scene:
         world.move_obstacle(obstacle.name, _FAR)
-    controller = DensityTracking(world, motion, evasion=_Standing)
+    controller = DensityTracking(world, motion, evasion=Evasion if moving else _Standing)
     world.change_to(scene)
     return controller
 
@@ -221,19 +247,50 @@ class _Standing(Evasion):
         return False
 
 
+def _rest(t: float) -> None:
+    """Move nothing."""
+
+
+def _to_and_fro(world: World, moving: int) -> Callable[[float], None]:
+    """Return what moves the first spheres away from the arm's base and back, at a time [s].
+
+    Raises:
+        InvalidValueError: fewer spheres.
+    """
+    spheres = world.scene.obstacles
+    if moving > len(spheres):
+        raise InvalidValueError("moving", moving, f"at most {len(spheres)}, the spheres there are")
+    names = [sphere.name for sphere in spheres[:moving]]
+    places = np.array([sphere.position for sphere in spheres[:moving]])
+    ways = places / np.linalg.norm(places, axis=1, keepdims=True)
+    begin, end = _AWAY
+    rate = 2.0 * np.pi / _BACK_AGAIN
+
+    def move(t: float) -> None:
+        off = begin + 0.5 * (end - begin) * (1.0 - np.cos(rate * t))
+        speed = 0.5 * (end - begin) * rate * np.sin(rate * t)
+        for name, place, way in zip(names, places, ways, strict=True):
+            world.move_obstacle(name, place + off * way, velocity=speed * way)
+
+    return move
+
+
 def _percentiles(seconds: Array) -> list[float]:
     """Return the 50, 99 and 99.9 % [µs] of times [s]."""
     return [float(1e6 * time) for time in np.percentile(seconds, _PERCENT)]
 
 
-def _time(step: Step, states: list[State], out: Array) -> None:
-    """Time every call by itself.
+def _time(
+    step: Step, states: list[State], out: Array, move: Callable[[float], object] = _rest
+) -> None:
+    """Time every call by itself, obstacles having been moved before.
 
     Into `out` (3, at least N) go wall and processor time of each, and how often another process
     took the core in it or between it and the one before.
     """
     before = _switches()
     for k, state in enumerate(states):
+        move(state[0])
         began_processor = time.thread_time()
         began = time.perf_counter()
         step(*state)

@@ -71,6 +71,17 @@ class DistanceView:
         return np.array(rows, dtype=np.float64).reshape(-1, _FIELDS)
 
 
+def shape_positions(geometry_data: pin.GeometryData) -> Array:
+    """Return the positions of all shapes' frames (S, 3) [m] as a view, to be read and written.
+
+    They are members of the elements of one C++ vector.
+    """
+    views = [placement.translation for placement in geometry_data.oMg]
+    begin = [view.__array_interface__["data"][0] for view in views[:2]]
+    stride = (begin[-1] - begin[0], 8)
+    return np.lib.stride_tricks.as_strided(views[0], (len(views), 3), stride)
+
+
 @compiled
 def add_pair_gradients(rows: Array, jacobian: Array, sign: Array, out: Array) -> None:
     """Add the gradients of all distances to `out` (K, nv), with rows (K, 10) and S_2 - S_1 (K, nv).

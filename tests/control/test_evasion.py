@@ -1,11 +1,14 @@
 """Evasion: rows that hold where they can, balls that miss, and scenes that stand."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from scipy.optimize import linprog
 
+import densarm
 from densarm.arms.arm import Arm, load_arm
 from densarm.control.evasion import EVADING_GAIN, Evasion, EvasionParameters
 from densarm.control.regulation import DensityRegulation
@@ -111,6 +114,54 @@ def test_the_same_ball_hits_an_arm_that_does_not_see_it(
     crossing_runs: dict[type[Evasion], Run],
 ) -> None:
     assert crossing_runs[Blind].outcome == Outcome.COLLIDED
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("scenario", "clearance", "certified"),
+    [("panda_crossing", 0.012, False), ("panda_shared_table", 0.045, True)],
+)
+def test_scenarios_among_what_moves_are_reached(
+    scenario: str, clearance: float, certified: bool
+) -> None:
+    run = densarm.run(scenario)
+    assert (run.outcome, run.detail, run.replanned_at) == (Outcome.REACHED, "", ())
+    assert run.clearance.min() > clearance
+    checks = {check.name: check.holds for check in run.certificate.checks}
+    assert checks["swept"]
+    assert checks["replay"]
+    if certified:
+        assert run.certified
+
+
+@pytest.mark.slow
+def test_what_comes_into_the_way_and_stays_is_planned_around(tmp_path: Path) -> None:
+    file = tmp_path / "stays.toml"
+    file.write_text(
+        """
+        [robot]
+        name = "panda"
+
+        [task]
+        start = [0.418, 0.214, 0.207, -1.868, -0.05, 2.077, 1.43]
+        goal = [-0.395, 0.287, -0.167, -1.248, 0.047, 1.532, 0.232]
+
+        [[obstacles]]
+        type = "sphere"
+        name = "ball"
+        radius = 0.1
+
+        [obstacles.motion]
+        type = "waypoints"
+        times = [0.0, 0.6]
+        positions = [[1.3, 0.05, 0.45], [0.6, 0.0, 0.45]]
+        """
+    )
+    run = densarm.run(file)
+    assert run.outcome == Outcome.REACHED
+    assert len(run.replanned_at) == 1
+    assert run.replanned_at[0] > 0.6
+    assert run.clearance.min() > 0.02
 
 
 @pytest.mark.slow

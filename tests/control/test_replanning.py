@@ -23,6 +23,7 @@ class Recorder:
     def __init__(self, arm: Arm, motion: Motion | None = None) -> None:
         self.arm, self.motion = arm, motion
         self.times, self.tracking_error = list[float](), 0.0
+        self.is_evading = False
 
     def torque(self, t: float, *_: Any) -> Array:
         self.times.append(t)
@@ -75,6 +76,21 @@ def test_pushed_arm_is_stopped_first_and_has_a_new_plan_from_where_it_rests(arm:
     assert controller.replanned_at == (0.31,)
     assert first.times == [0.0]
     assert second.times == pytest.approx([0.0, 0.04])
+
+
+def test_an_arm_that_gives_way_is_not_stopped_and_planned_for_where_it_stands(arm: Arm) -> None:
+    first, second = (Recorder(arm, standing_motion(arm, 9.0)) for _ in range(2))
+    first.is_evading, first.tracking_error = True, 0.9
+    controller, asked = watched(arm, first, iter([None, second]))
+    rest, goes = np.zeros(arm.nv), arm.configuration([0.9, 0.0, 0.0])
+    for k in range(30):
+        controller.torque(k * PERIOD, arm.configuration([0.03 * k, 0.0, 0.0]), rest)
+    assert (len(first.times), asked) == (30, [])
+    for k in range(30, 200):
+        controller.torque(k * PERIOD, goes, rest)
+    assert len(asked) == 2  # the first was in vain, and the arm went on
+    assert len(first.times) + len(second.times) == 200
+    assert controller.replanned_at == pytest.approx((1.3,), abs=3 * PERIOD)
 
 
 def test_arm_within_reach_of_its_motion_is_left_alone(arm: Arm) -> None:

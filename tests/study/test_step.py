@@ -45,6 +45,16 @@ def test_without_a_switch_all_but_the_first_of_a_turn_are_steady(
     assert timing.steady_percentiles_us[0] > timing.resumed_us
 
 
+def test_steps_among_spheres_that_move_are_timed_beside_the_others() -> None:
+    timing = step.time_step("two_link", pairs=4, steps=40, moving=1)
+    assert timing.evading_us is not None
+    assert timing.evading_us > 0.0
+    assert timing.evading_ratio == pytest.approx(timing.evading_us / timing.step_us)
+    assert step.time_step("two_link", pairs=2, steps=1).evading_us is None
+    with pytest.raises(InvalidValueError, match="moving = 9"):
+        step.time_step("two_link", pairs=4, steps=1, moving=9)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("shapes", ["hull", "capsule"])
 @pytest.mark.parametrize("pairs", [5, 64, 70])

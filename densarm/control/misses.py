@@ -1,0 +1,215 @@
+"""MissesAhead: rows that make an arm step aside from where it would meet what moves."""
+
+import math
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from densarm.values.arrays import Array
+from densarm.values.kernels import compiled, compiled_part
+from densarm.world.active_pairs import ActivePairs, pair_motion
+from densarm.world.distance_view import add_pair_gradient, shape_positions
+from densarm.world.pair_queries import PairQueries
+from densarm.world.world import World
+
+_LAG = 0.04  # [s] until a velocity that is asked for is reached
+_SOONEST = 0.03  # [s] in which a miss is made good
+_REACH = 0.12  # [m] beyond which a miss is no row
+
+
+class MissesAhead:
+    r"""Rows of pairs that would be too near in some time, if arm and obstacles go on as they do.
+
+    .. math:: \hat h_k + (\tau - \tau_0) \nabla \hat h_k \cdot (\dot q - v) \ge 0
+
+    ĥ_k and its gradient are those at the time t + τ. Asked for are pairs awake which may be within
+    reach then by their Lipschitz constants, and then by balls around their bodies.
+
+    Args:
+        world: the pairs.
+        pairs: the same, updated by their owner.
+        miss: by how much bodies are to miss each other [m].
+    """
+
+    def __init__(self, world: World, pairs: ActivePairs, miss: float) -> None:
+        arm, geometry = world.arm, world.geometry_model
+        self._world, self._pairs, self._miss = world, pairs, miss
+        self._queries = PairQueries(arm.model, geometry, world.pair_shapes, remembers=False)
+        self._places, self._came = shape_positions(self._queries.data), -1
+        self._data = arm.model.createData()
+        self._jacobian = self._data.J.reshape(6, arm.nv)
+        # Shapes of obstacles, and a pair of each; radii of balls about the frames of all shapes.
+        self._bodies = np.array(np.unique(world.pair_shapes[:, 1], return_index=True)).T
+        self._radius, self._there = np.zeros(geometry.ngeoms), np.zeros(arm.nv)
+        self._near = np.zeros(world.n_pairs, np.int64)
+
+    def write(
+        self,
+        is_moving: NDArray[np.bool_],
+        angles: Array,
+        v: Array,
+        limits: Array,
+        ahead: float,
+        table: Array,
+    ) -> int:
+        """Write rows [∇h, b] (nv + 1,) for ∇h · q̇ ≥ b into a table, and return how many.
+
+        Args:
+            is_moving: of pairs (K,).
+            angles: joint positions (nv,) [rad or m].
+            v: velocity (nv,) [rad/s or m/s].
+            limits: least and largest joint positions, in the first two rows.
+            ahead: τ [s].
+            table: rows (at least K, nv + 1).
+        """
+        world, pairs, near, there = self._world, self._pairs, self._near, self._there
+        reach = self._miss + _REACH
+        n, turns, came = _may_meet(
+            pairs.state,
+            pairs.rows,
+            is_moving,
+            world.changes,
+            world.lipschitz,
+            world.twist,
+            angles,
+            v,
+            limits,
+            ahead,
+            reach,
+            near,
+            there,
+        )
+        if not n:
+            return 0
+        if came != self._came:
+            self._came = came
+            self._measure()
+        model, data = world.arm.model, self._queries.data
+        pin.computeJointJacobians(model, self._data, world.arm.configurations(there))
+        pin.updateGeometryPlacements(model, self._data, world.geometry_model, data)
+        for shape, k in self._bodies.tolist() if turns else ():
+            turn = pin.exp3(ahead * world.twist[k, 3:])
+            data.oMg[shape].rotation = turn @ data.oMg[shape].rotation
+        n = _meet(
+            near[:n],
+            self._bodies,
+            world.pair_shapes,
+            self._places,
+            self._radius,
+            world.twist,
+            ahead,
+            reach,
+        )
+        self._queries.ask(near[:n])
+        rows, soon = self._queries.rows, max(ahead - _LAG, _SOONEST)
+        return int(
+            _miss_rows(near[:n], rows, self._jacobian, world.sign, v, self._miss, soon, table)
+        )
+
+    def _measure(self) -> None:
+        """Measure the balls, after an obstacle has come."""
+        for k, item in enumerate(self._world.geometry_model.geometryObjects):
+            shape = item.geometry
+            shape.computeLocalAABB()
+            self._radius[k] = shape.aabb_radius + np.linalg.norm(shape.aabb_center)
+
+
+@compiled
+def _may_meet(
+    state: NDArray[np.int64],
+    rows: Array,
+    is_moving: NDArray[np.bool_],
+    changes: NDArray[np.int64],
+    lipschitz: Array,
+    twist: Array,
+    angles: Array,
+    v: Array,
+    limits: Array,
+    ahead: float,
+    reach: float,
+    near: NDArray[np.int64],
+    there: Array,
+) -> tuple[int, bool, int]:
+    """Write which pairs may be within reach after some time, and where the joints are then.
+
+    Returns:
+        How many, whether the obstacle of any of them turns, and the last change of the world that
+        an obstacle came with.
+    """
+    count, turns, came, fastest = 0, False, 0, np.abs(v)
+    for k in range(state.shape[0]):
+        came = max(came, changes[k])
+        if state[k] == 0 or not is_moving[k]:
+            continue
+        speed = math.sqrt(twist[k, 0] ** 2 + twist[k, 1] ** 2 + twist[k, 2] ** 2)
+        if rows[k, 0] - (speed + pair_motion(lipschitz, k, fastest)) * ahead < reach:
+            near[count] = k
+            count += 1
+            turns |= twist[k, 3] != 0.0 or twist[k, 4] != 0.0 or twist[k, 5] != 0.0
+    for j in range(v.size):
+        there[j] = min(max(angles[j] + ahead * v[j], limits[0, j]), limits[1, j])
+    return count, turns, came
+
+
+@compiled
+def _meet(
+    near: NDArray[np.int64],
+    bodies: NDArray[np.int64],
+    pair_shapes: NDArray[np.int64],
+    places: Array,
+    radius: Array,
+    twist: Array,
+    ahead: float,
+    reach: float,
+) -> int:
+    """Move obstacles on, and keep pairs whose balls are within reach; return how many are left."""
+    for b in range(bodies.shape[0]):
+        shape, k = bodies[b]
+        x, y, z = places[shape]
+        wx, wy, wz = twist[k, 3:]
+        places[shape, 0] += ahead * (twist[k, 0] + (wy * z - wz * y))
+        places[shape, 1] += ahead * (twist[k, 1] + (wz * x - wx * z))
+        places[shape, 2] += ahead * (twist[k, 2] + (wx * y - wy * x))
+    count = 0
+    for k in near:
+        first, second = pair_shapes[k]
+        gap = -radius[first] - radius[second]
+        gap += math.sqrt(((places[first] - places[second]) ** 2).sum())
+        if not gap > reach:  # a half-space has no middle
+            near[count] = k
+            count += 1
+    return count
+
+
+@compiled
+def _miss_rows(
+    near: NDArray[np.int64],
+    rows: Array,
+    jacobian: Array,
+    sign: Array,
+    v: Array,
+    miss: float,
+    soon: float,
+    table: Array,
+) -> int:
+    count, n = 0, v.size
+    for k in near:
+        h = rows[k, 0] - miss
+        if h <= _REACH:
+            table[count, n] = write_slope(rows[k], jacobian, sign[k], v, table[count])
+            table[count, n] -= h / soon
+            count += 1
+    return count
+
+
+@compiled_part
+def write_slope(distance: Array, jacobian: Array, sign: Array, v: Array, row: Array) -> float:
+    """Write the gradient of a distance, and return how fast the arm changes it [m/s]."""
+    speed, n = 0.0, v.size
+    for j in range(n):
+        row[j] = 0.0
+    add_pair_gradient(distance, jacobian, sign, 1.0, row[:n])
+    for j in range(n):
+        speed += row[j] * v[j]
+    return speed
