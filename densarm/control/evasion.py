@@ -111,7 +111,7 @@ class Evasion:
     ) -> None:
         arm, p = world.arm, parameters
         self._world, self._arm, self._pairs, self.parameters = world, arm, pairs, p
-        self._version, self._way_before = 0, world.obstacle_way.copy()
+        self._version, self._way_before = -1, world.obstacle_way.copy()
         self._is_moving, self._is_needed = np.zeros(world.n_pairs, bool), False
         self._ahead = np.array([margin + p.margin + p.distance, p.reaction + p.horizon])
         n, size = arm.nv, (_TIMES + 1) * world.n_pairs
@@ -127,6 +127,7 @@ class Evasion:
         self._reaches = np.full((2, world.n_pairs), np.nan)
         self._density = np.array([margin, p.distance, p.decay, p.margin, p.reaction])
         self._most, self._none = HELD_SHARE * limits.acceleration, np.zeros(n)
+        self.is_needed()  # its kernel is loaded, or compiled, before a control loop
 
     def is_needed(self) -> bool:
         """Return whether any obstacle moves, or was moved; pairs are awake in time from then on."""

@@ -40,7 +40,7 @@ from densarm.density.navigation_density import (
 from densarm.density.unsafe_sets import SensingParameters, UnsafeSet
 from densarm.planning.motion import Motion, write_sample
 from densarm.values.arrays import Array
-from densarm.values.kernels import compiled, compiled_part
+from densarm.values.kernels import compiled, compiled_part, entry_point
 from densarm.world.active_pairs import ActivePairs
 from densarm.world.stopping import HELD_SHARE
 from densarm.world.world import World
@@ -149,11 +149,14 @@ class DensityTracking:
         constants = motion.period, actuation.delay, kappa, gains.position, gains.velocity
         self._numbers[_PERIOD:_N_NUMBERS] = *constants, 1.0
         self._sample = np.zeros((6, arm.nv))
-        self._arrays = self._numbers, self._sample, motion.knots, self._dynamics.arrays
+        own = self._numbers, self._sample, motion.knots, self._dynamics.arrays
+        self._arrays = self._density.log_psi_gradient, *own
         self._sample[_WEIGHTS] = getattr(distance, "weights", 1.0)
         self._sample[_MOST] = _PAUSE_SHARE * arm.limits.acceleration
+        still = np.zeros(arm.nv)
+        self._kernel = entry_point(_tracking_torque, 0.0, self.goal, still, 0.0, *self._arrays)
         for t in (0.0, motion.period, math.nan):  # kernels are loaded before a control loop
-            self.torque(t, self.goal, np.zeros(arm.nv))
+            self.torque(t, self.goal, still)
         self.tracking_error = 0.0
 
     def torque(self, t: float, q: ArrayLike, v: ArrayLike) -> Array:
@@ -179,10 +182,7 @@ class DensityTracking:
 
     def _act(self, t: float, q: Array, v: Array) -> None:
         """Send the torque at a state, of which all terms and Ψ are known."""
-        density = self._density
-        self.tracking_error = _tracking_torque(
-            t, q, v, density.log_psi, density.log_psi_gradient, *self._arrays
-        )
+        self.tracking_error = self._kernel(t, q, v, self._density.log_psi, *self._arrays)
 
     def _evade(self, q: Array) -> None:
         """Replace the torque by one that gives way, and that returns to the reference.

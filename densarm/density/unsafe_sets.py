@@ -14,7 +14,7 @@ from densarm.errors import InvalidValueError
 from densarm.values.arrays import Array
 from densarm.values.checks import non_negative, positive, positive_array
 from densarm.values.documented import documented
-from densarm.values.kernels import compiled
+from densarm.values.kernels import any_vector, compiled, entry_point
 from densarm.world.active_pairs import ActivePairs
 from densarm.world.distance_view import add_pair_gradient
 from densarm.world.world import World
@@ -129,6 +129,7 @@ class ClearanceSet:
         pairs = self.pairs
         jacobian, sign = pairs.kinematics.jacobian, world.sign
         self._arrays = pairs.state, pairs.rows, jacobian, sign, self.margin, self.sensing_distance
+        self._add_log_bumps = entry_point(_add_active_log_bumps, *self._arrays, 0.0, any_vector)
         self.set_sensing_distance(self.sensing_distance)
 
     def set_sensing_distance(self, sensing_distance: Array) -> None:
@@ -150,7 +151,8 @@ class ClearanceSet:
             if now != self._n_moving:
                 self.set_sensing_distance(self._standing)
         pairs.update(q)
-        return _add_active_log_bumps(*self._arrays, theta, out_gradient)
+        value: float = self._add_log_bumps(*self._arrays, theta, out_gradient)
+        return value
 
     def _is_moving(self) -> NDArray[np.bool_]:
         world = self.world
@@ -190,6 +192,8 @@ class JointLimitSet:
         self._bounds = bounds[members]
         self.member = np.array([self._bounds, side, width[joint]])
         """Limits [rad or m], 1 for a lower and -1 for an upper one, and σ [rad or m] (3, M)."""
+        types = any_vector, self.index, self.member, 0.0, any_vector
+        self._add_log_bumps = entry_point(_add_limit_log_bumps, *types)
 
     def set_sensing_distance(self, sensing_distance: Array) -> None:
         """Sense the limits at others from now on, σ > 0 (nv,) [rad or m]; -inf: not at all."""
@@ -199,7 +203,9 @@ class JointLimitSet:
 
     def add_log_bump(self, q: Array, theta: float, out_gradient: Array) -> float:
         """Act as `UnsafeSet.add_log_bump`."""
-        return _add_limit_log_bumps(q, self.index, self.member, theta, out_gradient)
+        q = np.asarray(q, np.float64)
+        value: float = self._add_log_bumps(q, self.index, self.member, theta, out_gradient)
+        return value
 
     def add_curvature(self, q: Array, theta: float, out: Array) -> None:
         """Act as `Curved.add_curvature`."""

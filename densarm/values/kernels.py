@@ -5,10 +5,12 @@ import time
 from collections.abc import Callable
 from contextlib import AbstractContextManager
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numba
+import numpy as np
 from numba.core import event
+from numba.core.registry import CPUDispatcher as Dispatcher
 
 
 def _kernels_text() -> str:
@@ -46,6 +48,26 @@ else:
 
 Without an entry from Python, and without a file of its own, a part takes less time to compile.
 """
+
+
+def entry_point(kernel: Callable[..., Any], *arguments: object) -> Callable[..., Any]:
+    """Return a kernel as it is for arguments of the types that these have, loaded or compiled.
+
+    Half the time of a short call goes into finding out the types of its arguments. This one does
+    not look: an array of another type of numbers, or of rows elsewhere than told, would be taken
+    for what it is not. `any_vector` stands for a vector that may lie in memory as it likes.
+    """
+    if not isinstance(kernel, Dispatcher):  # compiling is switched off
+        return kernel
+    known: Any = kernel
+    signature = tuple(known.typeof_pyval(argument) for argument in arguments)
+    known.compile(signature)
+    entry: Callable[..., Any] = known.overloads[signature].entry_point
+    return entry
+
+
+any_vector = np.zeros(4)[::2]
+"""A vector whose numbers do not follow each other."""
 
 
 class CompileTime(event.Listener):

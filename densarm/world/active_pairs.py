@@ -11,7 +11,7 @@ from densarm.arms.arm import Arm
 from densarm.arms.dynamics import Kinematics
 from densarm.arms.joint_space import joint_error, sliding_joints
 from densarm.values.arrays import Array
-from densarm.values.kernels import compiled, compiled_part
+from densarm.values.kernels import any_vector, compiled, compiled_part, entry_point
 from densarm.world.pair_queries import PairQueries
 from densarm.world.world import DISTANCE_TOLERANCE, World
 
@@ -128,6 +128,7 @@ class ActivePairs:
             world.changes,
             world.obstacle_way,
         )
+        self._wake = entry_point(_wake, any_vector, *self._arrays)
         self.update(rest)  # kernels are loaded, or compiled, before a control loop
         self.wake_all()
 
@@ -160,7 +161,7 @@ class ActivePairs:
     def update(self, q: Array) -> None:
         """Query the pairs that may be within reach at q (nq,), and some others."""
         data = self._geometry_data
-        n_awake, n_changed = _wake(q, *self._arrays)
+        n_awake, n_changed = self._wake(np.asarray(q, np.float64), *self._arrays)
         self._bounds = None
         for k in self._pair_states[2, :n_changed].tolist() if n_changed else ():
             if k >= 0:
