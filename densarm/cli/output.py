@@ -131,11 +131,16 @@ def print_run(run: Run, compiled: float) -> None:
     if large := run.task.large_meshes:
         sides = ", ".join(f"{name} {side:.3g} m" for name, side in large.items())
         figures["large meshes"] = f"{sides}: is their unit right?"
+    print_figures(figures)
+    click.echo()
+    print_certificate(run.certificate)
+
+
+def print_figures(figures: Mapping[str, str]) -> None:
+    """Print texts by their labels, one a line, without those that are empty."""
     for label, value in figures.items():
         if value:
             click.echo(f"{label:<{_COLUMN}}{value}")
-    click.echo()
-    print_certificate(run.certificate)
 
 
 def print_certificate(certificate: Certificate) -> None:
