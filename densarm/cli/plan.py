@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from densarm.cli.options import output_option, way_options
-from densarm.cli.output import print_figures, progress, write_json
+from densarm.cli.output import doubts, print_figures, progress, write_json
 from densarm.errors import DensarmError, InvalidValueError
 from densarm.values.files import atomic_file
 
@@ -102,6 +102,7 @@ def plan(
             "density": motion.remark,
             "compiled": once,
             "may be off by": tubes or "nothing, as far as is proved",
+            **doubts(chosen.task, chosen.world.base_overlaps()),
         }
     )
     return True

@@ -70,6 +70,15 @@ def test_no_path_is_status_one_with_its_sentence(
     assert list(folder.iterdir()) == []
 
 
+def test_what_is_not_checked_is_told(command: Command, scenario_file: Callable[..., Path]) -> None:
+    table = 'type = "box"\nname = "table"\nsize = [2.0, 2.0, 0.1]\nposition = [0.0, 0.0, 0.0]'
+    posture = "[0.0, -0.785, 0.0, -2.356, 0.0, 1.571, 0.785]"
+    task = f"start = {posture}\ngoal = {posture}"
+    path = scenario_file('name = "panda"', task, f"[[obstacles]]\n{table}")
+    done = command("plan", path)
+    assert "not checked       'panda_link0_0' is in 'table' by " in done.out
+
+
 def test_an_arm_at_its_goal_stays_there(
     command: Command, scenario_file: Callable[..., Path], tmp_path: Path
 ) -> None:
