@@ -1,3 +1,4 @@
+import json
 import re
 import runpy
 from pathlib import Path
@@ -236,3 +237,20 @@ def test_pose_goal(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixtur
     assert certified == "certified: True"
     assert error.startswith("infeasible: goal: pose of 'panda_hand_tcp' at (1.4, 0, 0.3) m")
     assert "out of reach: the nearest found is" in error
+
+
+@pytest.mark.slow
+def test_plan_only(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    run_example(monkeypatch, "plan_only.py", "--out", str(tmp_path))
+    points, tube = capsys.readouterr().out.splitlines()
+    assert points.endswith(" points of 6 joints")
+    assert tube.startswith("proved clear within 0.0")
+    rows = np.loadtxt(tmp_path / "plan_only.csv", delimiter=",", skiprows=1)
+    data = json.loads((tmp_path / "plan_only.json").read_text(encoding="utf-8"))
+    np.testing.assert_allclose(
+        rows[:, 1:7], [point["positions"] for point in data["points"]], atol=1e-8
+    )
+    goal = densarm.load_scenario("ur5_bin").goal
+    np.testing.assert_allclose(rows[-1, 1:7], goal, atol=0.01)

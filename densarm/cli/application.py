@@ -52,6 +52,7 @@ def application() -> "click.Group":
     from densarm.cli.bench import bench
     from densarm.cli.compare import compare
     from densarm.cli.list_known import list_known
+    from densarm.cli.plan import plan
     from densarm.cli.recorded import verify, view
     from densarm.cli.run import run
 
@@ -72,7 +73,7 @@ def application() -> "click.Group":
           130  interrupted by Ctrl-C
         """  # noqa: D301
 
-    for command in (list_known, run, view, verify, bench, compare):
+    for command in (list_known, run, plan, view, verify, bench, compare):
         group.add_command(command)
     return group
 

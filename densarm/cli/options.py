@@ -2,6 +2,7 @@
 
 import json
 import os
+import tomllib
 from collections.abc import Callable
 from functools import reduce
 from pathlib import Path
@@ -68,6 +69,39 @@ def read_disturbances(
             told[name] = value  # a name, or what its check refuses
     return told
 
+
+def _read_goal(ctx: click.Context, param: click.Parameter, text: str | None) -> Any:
+    """Return a goal as TOML has it; a text that is none is the name of a posture."""
+    if text is None:
+        return None
+    try:
+        return tomllib.loads(f"goal = {text}")["goal"]
+    except (ValueError, RecursionError) as error:
+        if text.lstrip()[:1] in ("{", "["):
+            raise click.BadParameter(f"{text!r}: not as in TOML: {error}", ctx, param) from None
+        return text
+
+
+way_options = together(
+    click.option(
+        "--guide",
+        type=click.Choice(["auto", "density", "direct", "path"]),
+        help="What leads: the density, by via points where it is stuck, else a planner's path "
+        "(auto); the first two; the first alone; the last.  [default: what the scenario says, "
+        "else auto]",
+    ),
+    click.option(
+        "--goal",
+        callback=_read_goal,
+        metavar="GOAL",
+        help="In place of the scenario's, as in its file: a posture, [joint positions], a pose "
+        "{frame = ..., position = [...]}, or a list of these.",
+    ),
+    number_option(
+        "--seed", None, "Seed of the planner.  [default: what the scenario says, else 0]", least=0
+    ),
+)
+"""Adds --guide, --goal and --seed, each None for the scenario's own; a goal is as TOML has it."""
 
 plant_options = together(
     click.option(

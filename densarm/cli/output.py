@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 
     from densarm.certificates.certificate import Certificate
     from densarm.certificates.records import EnergyRecord, RantzerRecord
+    from densarm.certificates.task import Task
     from densarm.simulation.run import Run
 
 _COLUMN = 18  # characters
@@ -119,23 +120,33 @@ def print_run(run: Run, compiled: float) -> None:
         "density": run.remark,
         "compiled": f"{compiled:.1f} s, once on this machine" if compiled > 0.0 else "",
         "planned again": ", ".join(f"at t = {time:.3f} s" for time in run.replanned_at),
-        "robot": "; ".join(run.task.arm.remarks),
     }
     if run.task.plant != "pinocchio" or run.task.disturbances:
         told = ", ".join(f"{name} {value}" for name, value in run.task.disturbances.items())
         figures["plant"] = f"{run.task.plant}, {told or 'undisturbed'}"
     if run.tracking_error is not None:
         figures["tracking error"] = f"{run.tracking_error:.2g} rad"
-    if run.base_overlaps:
-        figures["not checked"] = f"{'; '.join(run.base_overlaps)}: neither moves"
-    if large := run.task.large_meshes:
+    print_figures(figures | doubts(run.task, run.base_overlaps))
+    click.echo()
+    print_certificate(run.certificate)
+
+
+def doubts(task: Task, base_overlaps: Sequence[str]) -> dict[str, str]:
+    """Return what of arm and scene may not be as it was meant, by labels of `print_figures`."""
+    found = {"robot": "; ".join(task.arm.remarks)}
+    if base_overlaps:
+        found["not checked"] = f"{'; '.join(base_overlaps)}: neither moves"
+    if large := task.large_meshes:
         sides = ", ".join(f"{name} {side:.3g} m" for name, side in large.items())
-        figures["large meshes"] = f"{sides}: is their unit right?"
+        found["large meshes"] = f"{sides}: is their unit right?"
+    return found
+
+
+def print_figures(figures: Mapping[str, str]) -> None:
+    """Print texts by their labels, one a line, without those that are empty."""
     for label, value in figures.items():
         if value:
             click.echo(f"{label:<{_COLUMN}}{value}")
-    click.echo()
-    print_certificate(run.certificate)
 
 
 def print_certificate(certificate: Certificate) -> None:

@@ -1,46 +1,18 @@
 """``densarm run``: plan and simulate a scenario."""
 
-import tomllib
 from pathlib import Path
 from typing import Any
 
 import click
 
 from densarm.cli.first_run import compiling_meanwhile
-from densarm.cli.options import number_option, output_option, picture_options, plant_options
+from densarm.cli.options import output_option, picture_options, plant_options, way_options
 from densarm.cli.output import print_run, progress, write_json, write_pictures
-
-
-def _read_goal(ctx: click.Context, param: click.Parameter, text: str | None) -> Any:
-    """Return a goal as TOML has it; a text that is none is the name of a posture."""
-    if text is None:
-        return None
-    try:
-        return tomllib.loads(f"goal = {text}")["goal"]
-    except (ValueError, RecursionError) as error:
-        if text.lstrip()[:1] in ("{", "["):
-            raise click.BadParameter(f"{text!r}: not as in TOML: {error}", ctx, param) from None
-        return text
 
 
 @click.command()
 @click.argument("scenario")
-@click.option(
-    "--guide",
-    type=click.Choice(["auto", "density", "direct", "path"]),
-    help="What leads: the density, by via points where it is stuck, else a planner's path (auto); "
-    "the first two; the first alone; the last.  [default: what the scenario says, else auto]",
-)
-@click.option(
-    "--goal",
-    callback=_read_goal,
-    metavar="GOAL",
-    help="In place of the scenario's, as in its file: a posture, [joint positions], a pose "
-    "{frame = ..., position = [...]}, or a list of these.",
-)
-@number_option(
-    "--seed", None, "Seed of the planner.  [default: what the scenario says, else 0]", least=0
-)
+@way_options
 @plant_options
 @click.option("--viewer", is_flag=True, help="Show it in MuJoCo's viewer while it runs.")
 @output_option("--save", "RUN.npz", "Write the recorded run.")

@@ -137,9 +137,12 @@ class Motion:
             period: time between two samples [s].
 
         Raises:
-            InvalidValueError: a period that is not positive.
+            InvalidValueError: a period that is not positive, or of more than 10⁶ samples.
         """
-        steps = int(np.ceil(self.duration / positive("period", period) - 1e-9))
+        if self.duration > _MOST_SAMPLES * positive("period", period):
+            least = self.duration / _MOST_SAMPLES
+            raise InvalidValueError("period", period, f"at least {least:.2g} s, for 10⁶ samples")
+        steps = int(np.ceil(self.duration / period - 1e-9))
         time = np.minimum(period * np.arange(steps + 1), self.duration)
         return MotionSamples(time, *np.stack([self.sample(t) for t in time], axis=1))
 
@@ -157,6 +160,8 @@ class PlanningError(DensarmError):
         self.outcome, self.detail, self.motion = outcome, detail, motion
         super().__init__(f"{outcome}: {detail}")
 
+
+_MOST_SAMPLES = 10**6
 
 _ROUNDING = 1e-6  # of a period; at a knot the acceleration is that after it, however time rounds
 

@@ -143,7 +143,7 @@ def by_density(
         PlanningError: there is no way, or, without a guide's path, the density is stuck at once.
     """
     world = world or scenario.world
-    drive = _plan(scenario, world, scenario.start, guide)
+    drive = _drive(scenario, world, scenario.start, guide)
     goal = scenario.goal if drive.goal is None else drive.goal
     scenario = replace(scenario, goal=goal, goals=()) if scenario.goals else scenario
     is_told_velocity = scenario.control.form == ControlForm.VELOCITY
@@ -152,7 +152,7 @@ def by_density(
 
     def plan_again(q: Array) -> Controller | None:
         try:
-            return _plan(scenario, world, q, guide).controller
+            return _drive(scenario, world, q, guide).controller
         except PlanningError:
             return None
 
@@ -168,20 +168,52 @@ def by_density(
     return replace(drive, controller=controller)
 
 
-def _plan(scenario: Scenario, world: World, start: Array, guide: Guide | None) -> Drive:
-    control, period = scenario.control, scenario.simulation.control_period
-    chosen = control.guide if guide is None else guide
-    goal: Any = list(scenario.goals) or scenario.goal
-    search: dict[str, Any] = {
+def plan(
+    scenario: Scenario,
+    guide: Guide | str | None = None,
+    *,
+    world: World | None = None,
+    start: Array | None = None,
+) -> Motion:
+    """Plan a scenario's motion, whatever its form of control.
+
+    Guide, world and start (nq,) replace the scenario's own.
+
+    Raises:
+        PlanningError: there is no motion, with the outcome and the reason.
+    """
+    return plan_motion(
+        world or scenario.world,
+        scenario.start if start is None else start,
+        **_asked(scenario, guide),
+        period=scenario.simulation.control_period,
+        timing=scenario.timing,
+        time_limit=scenario.simulation.time_limit,
+    )
+
+
+def _asked(scenario: Scenario, guide: Guide | str | None) -> dict[str, Any]:
+    """Return what a scenario asks of `plan_motion` and `plan_path`."""
+    control = scenario.control
+    return {
+        "goal": list(scenario.goals) or scenario.goal,
+        "guide": control.guide if guide is None else guide,
         "margin": control.margin,
         "seed": scenario.seed,
         "path_margin": control.path_margin,
+        "alpha": control.planning_alpha,
+        "kappa": control.kappa,
+        "density": scenario.density,
+        "sensing": scenario.sensing,
         "search": scenario.planning,
     }
+
+
+def _drive(scenario: Scenario, world: World, start: Array, guide: Guide | None) -> Drive:
+    control = scenario.control
     law: dict[str, Any] = {"density": scenario.density, "sensing": scenario.sensing}
-    search |= {**law, "alpha": control.planning_alpha, "kappa": control.kappa}
     if control.form in {ControlForm.REGULATION, ControlForm.PLAIN}:
-        planned = plan_path(world, start, goal, chosen, **search)
+        planned = plan_path(world, start, **_asked(scenario, guide))
         is_plain = control.form == ControlForm.PLAIN
         regulation = DensityRegulation(
             world,
@@ -191,23 +223,14 @@ def _plan(scenario: Scenario, world: World, start: Array, guide: Guide | None) -
             margin=control.margin,
             gains=scenario.law_gains,
             actuation=scenario.actuation,
-            period=period,
+            period=scenario.simulation.control_period,
             goal_distance=None if is_plain else scenario.goal_distance,
             speed=scenario.speed,
             **law,
         )
         return Drive(regulation, planned.plan_time, path=planned.path, goal=planned.goal)
     try:
-        motion = plan_motion(
-            world,
-            start,
-            goal,
-            chosen,
-            **search,
-            period=period,
-            timing=scenario.timing,
-            time_limit=scenario.simulation.time_limit,
-        )
+        motion = plan(scenario, guide, world=world, start=start)
     except PlanningError as error:
         if error.motion is None:
             raise

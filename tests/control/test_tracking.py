@@ -94,11 +94,11 @@ def test_torque_is_that_of_its_parts(
     assert sensed > 10
 
 
-def test_the_formula_of_the_readme_is_the_one_that_runs(
+def test_the_formula_of_the_architecture_is_the_one_that_runs(
     swing_up: Scenario, swing_up_motion: Motion
 ) -> None:
-    readme = (Path(__file__).parents[2] / "README.md").read_text(encoding="utf-8")
-    assert "τ = H + M (q̈_d + K_p ∇(−1/ρ) − K_v ė)" in readme
+    page = (Path(__file__).parents[2] / "docs" / "architecture.md").read_text(encoding="utf-8")
+    assert "τ = H + M (q̈_d + K_p ∇(−1/ρ) − K_v ė)" in page
     arm, motion = load_arm("two_link", torque_rate=np.inf), swing_up_motion
     world = World(arm, swing_up.scene)
     controller = DensityTracking(world, motion, gains=GAINS, actuation=TRUSTED)

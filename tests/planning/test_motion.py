@@ -104,7 +104,7 @@ def test_a_lead_takes_the_acceleration_later(motion: Motion) -> None:
     np.testing.assert_allclose(now.acceleration, then.acceleration, rtol=1e-9)
 
 
-@pytest.mark.parametrize("period", [0.0, -0.1, np.nan, "short"])
+@pytest.mark.parametrize("period", [0.0, -0.1, np.nan, "short", 1e-9, 1e-320])
 def test_the_period_of_samples_is_checked(motion: Motion, period: float) -> None:
     with pytest.raises(InvalidValueError, match=r"^period = "):
         motion.samples(period)
