@@ -1,0 +1,125 @@
+"""PoseDistance: the goal distance of a pose, which any configuration will do for that has it."""
+
+import math
+
+import numpy as np
+import pinocchio as pin
+
+from densarm.arms.arm import Arm
+from densarm.arms.models import frame_index
+from densarm.arms.pose import AXES, Pose
+from densarm.errors import InvalidValueError
+from densarm.values.arrays import Array
+
+LENGTH = 0.3
+"""ℓ: length that an error of position counts as a radian by [m]."""
+
+_LEAST_DAMPING = 1e-4  # of directions that the joints hardly move the frame in
+
+
+class PoseDistance:
+    r"""Half the squared error of the position and the axes of a frame.
+
+    .. math::
+
+        V(q) = \tfrac12 \|x\|^2, \qquad \nabla V = A^T x, \qquad
+        x = \begin{bmatrix} (p - p_d)/\ell \\ \sqrt{c_i} (r_i - d_i) \end{bmatrix}, \qquad
+        A = \begin{bmatrix} J_v/\ell \\ -\sqrt{c_i}\, [r_i]_\times J_\omega \end{bmatrix}
+
+    with p the frame's origin, r_i its three axes, p_d and d_i where they shall be, and J_v, J_ω its
+    Jacobian, all in the world. For a whole pose c_i = 1/2, and what the axes add to V is
+
+    .. math:: \tfrac14 \|R - R_d\|_F^2 = \tfrac12 \operatorname{tr}(I - R_d^T R) = 1 - \cos\theta
+
+    with θ the angle that is left to turn. Free about an axis, that has 1 and the others 0, and θ is
+    the angle to it; for a position alone all are 0.
+
+    θ²/2 has a kink at θ = π, where log does not know which way to turn. This V is smooth
+    everywhere, as a density must be: at θ = π its gradient is zero, and ρ has a critical point,
+    which is left as others are. No cosine is taken, so that it keeps errors of 1e-8.
+
+    In the metric :math:`G = A^T A + (\lambda + V) I` its gradient is the step of Gauss and Newton,
+    damped: straight to the pose from nearby, and bounded where the arm is singular.
+
+    Args:
+        arm: its kinematics.
+        pose: where one of its frames shall be.
+
+    Raises:
+        UnknownNameError: no such frame.
+        InvalidValueError: a frame that no joint moves.
+
+    Source: F. Bullo and R. M. Murray, Proportional derivative (PD) control on the Euclidean group,
+        ECC 1995, for the trace; T. Sugihara, IEEE T-RO 27 (2011), for a damping that grows with V.
+    """
+
+    def __init__(self, arm: Arm, pose: Pose) -> None:
+        self._arm, self._data = arm, arm.model.createData()
+        self._x, self._slope = np.zeros(12), np.zeros((12, arm.nv))
+        self.set_pose(pose)
+
+    def set_pose(self, pose: Pose) -> None:
+        """Take another pose for the goal, of any frame.
+
+        Raises:
+            UnknownNameError: as for the class.
+            InvalidValueError: as for the class.
+        """
+        model = self._arm.model
+        frame = frame_index(model, pose.frame)
+        if model.frames[frame].parentJoint == 0:
+            allowed = f"one that a joint of {self._arm.name!r} moves"
+            raise InvalidValueError("frame", pose.frame, allowed)
+        self._frame, placement = frame, pose.placement
+        self._position = placement.translation - self._arm.origin
+        self._axes: Array = np.array(placement.rotation.T)
+        weights = [0.5 * (pose.free is None) + (pose.free == name) for name in AXES]
+        turns = pose.orientation_xyzw is not None
+        self._roots: Array = np.sqrt(weights) if turns else np.zeros(3)
+
+    def evaluate(self, q: Array, goal: Array, out_gradient: Array) -> float:
+        """Act as `GoalDistance.evaluate`, whatever configuration is called the goal."""
+        model, data, x, slope = self._arm.model, self._data, self._x, self._slope
+        pin.computeJointJacobians(model, data, q)
+        frame = pin.updateFramePlacement(model, data, self._frame)
+        jacobian = pin.getFrameJacobian(
+            model, data, self._frame, pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
+        )
+        x[:3] = (frame.translation - self._position) / LENGTH
+        slope[:3] = jacobian[:3] / LENGTH
+        for i, (root, axis) in enumerate(zip(self._roots, frame.rotation.T, strict=True)):
+            rows = slice(3 + 3 * i, 6 + 3 * i)
+            x[rows] = root * (axis - self._axes[i])
+            slope[rows] = -root * pin.skew(axis) @ jacobian[3:]
+        np.matmul(x, slope, out=out_gradient)
+        return 0.5 * float(x @ x)
+
+    @property
+    def metric(self) -> Array:
+        """G (nv, nv), where V was evaluated last."""
+        damping = _LEAST_DAMPING + 0.5 * float(self._x @ self._x)
+        return self._slope.T @ self._slope + damping * np.eye(self._arm.nv)
+
+    def step(self) -> Array:
+        """Return the step (nv,) [rad or m] to the goal from where V was evaluated last."""
+        return self._solved(-self._x)
+
+    def following(self, twist: Array) -> Array:
+        """Return the velocity (nv,) [rad/s or m/s] of an arm whose frame goes with a goal.
+
+        Args:
+            twist: of the goal (6,), linear [m/s] and angular [rad/s], in the world.
+        """
+        rate = np.empty(12)
+        rate[:3] = twist[:3] / LENGTH
+        rate[3:] = (self._roots[:, np.newaxis] * np.cross(twist[3:], self._axes)).ravel()
+        return self._solved(rate)
+
+    def off(self, q: Array) -> tuple[float, float]:
+        """Return how far the frame is off at q (nq,): its position [m], and θ [rad]."""
+        self.evaluate(q, q, np.empty(self._arm.nv))
+        sine = 0.5 * float(np.linalg.norm(self._x[3:]))
+        return LENGTH * float(np.linalg.norm(self._x[:3])), 2.0 * math.asin(min(sine, 1.0))
+
+    def _solved(self, rate: Array) -> Array:
+        return np.asarray(np.linalg.solve(self.metric, rate @ self._slope), dtype=np.float64)
