@@ -14,6 +14,7 @@ from densarm.values.arrays import Array
 LENGTH = 0.3
 """ℓ: length that an error of position counts as a radian by [m]."""
 
+_DAMPING = 0.2  # of ‖x‖, which is what the curvature of x adds to AᵀA where it cannot be zero
 _LEAST_DAMPING = 1e-4  # of directions that the joints hardly move the frame in
 
 
@@ -38,8 +39,9 @@ class PoseDistance:
     everywhere, as a density must be: at θ = π its gradient is zero, and ρ has a critical point,
     which is left as others are. No cosine is taken, so that it keeps errors of 1e-8.
 
-    In the metric :math:`G = A^T A + (\lambda + V) I` its gradient is the step of Gauss and Newton,
-    damped: straight to the pose from nearby, and bounded where the arm is singular.
+    In the metric :math:`G = A^T A + (\lambda_0 + \lambda \|x\|) I` its gradient is the step of
+    Levenberg and Marquardt: straight to the pose from nearby, bounded where the arm is singular,
+    and none that swings where the pose is out of reach.
 
     Args:
         arm: its kinematics.
@@ -50,7 +52,8 @@ class PoseDistance:
         InvalidValueError: a frame that no joint moves.
 
     Source: F. Bullo and R. M. Murray, Proportional derivative (PD) control on the Euclidean group,
-        ECC 1995, for the trace; T. Sugihara, IEEE T-RO 27 (2011), for a damping that grows with V.
+        ECC 1995, for the trace; J. Fan and Y. Yuan, On the quadratic convergence of the
+        Levenberg-Marquardt method without nonsingularity assumption, Computing 74 (2005), for ‖x‖.
     """
 
     def __init__(self, arm: Arm, pose: Pose) -> None:
@@ -97,7 +100,7 @@ class PoseDistance:
     @property
     def metric(self) -> Array:
         """G (nv, nv), where V was evaluated last."""
-        damping = _LEAST_DAMPING + 0.5 * float(self._x @ self._x)
+        damping = _LEAST_DAMPING + _DAMPING * math.sqrt(self._x @ self._x)
         return self._slope.T @ self._slope + damping * np.eye(self._arm.nv)
 
     def step(self) -> Array:
