@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable, Sequence
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -201,14 +201,12 @@ class DensityRegulation(FieldRegulation):
     Args:
         world: the arm among obstacles.
         goal: configuration (nq,), or a pose.
-        path: sub-goals that lead to a configuration, as `plan_path` finds them; None for the goal
-            alone.
+        path: sub-goals to a configuration, as `plan_path` finds them; None for the goal alone.
         plain: whether in the plain form.
         margin: safety margin m of the pairs [m].
         gains: K_p and K_v.
         period: time between two calls [s].
-        goal_distance: V of a configuration; None for a `TorusDistance`, or an `InertiaDistance` in
-            the plain form.
+        goal_distance: V of configurations; by default `TorusDistance`, `InertiaDistance` if plain.
         unsafe_sets: what else must not be entered, beside pairs of bodies and joint limits.
         density: α, θ, gauge and blend, and the weights of a `TorusDistance`.
         sensing: sensing distances.
@@ -250,7 +248,7 @@ class DensityRegulation(FieldRegulation):
         self._check = SweptCheck(world, margin)
         self._sensing = sensing
         self._joint_space_alone = {"plain": plain, "density.blend_radius": density.blend_radius}
-        self.goal: Array | Pose = self._checked(goal)
+        self.goal: Any = self._checked(goal)
         if path is not None and isinstance(goal, Pose):
             raise InvalidValueError("path", "sub-goals", "None where the goal is a pose")
         path = path or self._to_alone(self.goal)
@@ -328,11 +326,9 @@ class DensityRegulation(FieldRegulation):
 
     def _goal_velocity(self) -> Array:
         led_by = self._guided.density.goal_distance
-        if not self._moves:
-            return self._at_rest
-        if isinstance(led_by, PoseDistance):
+        if self._moves and isinstance(led_by, PoseDistance):
             return led_by.following(self._given_velocity)
-        return self._given_velocity
+        return self._given_velocity if self._moves else self._at_rest
 
     @property
     def remark(self) -> str:

@@ -80,7 +80,7 @@ class PoseDistance:
         turns = pose.orientation_xyzw is not None
         self._roots: Array = np.sqrt(weights) if turns else np.zeros(3)
 
-    def evaluate(self, q: Array, goal: Array, out_gradient: Array) -> float:
+    def evaluate(self, q: Array, goal: Array, out_gradient: Array) -> float:  # noqa: ARG002
         """Act as `GoalDistance.evaluate`, whatever configuration is called the goal."""
         model, data, x, slope = self._arm.model, self._data, self._x, self._slope
         pin.computeJointJacobians(model, data, q)

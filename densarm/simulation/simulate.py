@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -91,9 +92,8 @@ def simulate(
         driven = plant_of(world, plant or PLANTS[0], parameters, disturbances or Disturbances())
     else:
         driven = plant
-    wanted = getattr(controller, "goal", None) if goal is None else goal
-    pose = wanted if isinstance(wanted, Pose) else None
-    wanted = None if pose else wanted
+    wanted: Any = getattr(controller, "goal", None) if goal is None else goal
+    wanted, pose = (None, wanted) if isinstance(wanted, Pose) else (wanted, None)
     told = getattr(driven, "input", Input.TORQUE)
     task = Task(
         arm=world.arm,

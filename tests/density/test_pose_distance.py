@@ -1,4 +1,4 @@
-"""The goal distance of a pose: its gradient wherever the frame is, and the step that it leads to."""
+"""The goal distance of a pose: its gradient wherever the frame is, and where its steps lead."""
 
 import math
 from collections.abc import Callable
@@ -62,7 +62,7 @@ def evaluated(distance: PoseDistance, q: Array) -> tuple[float, Array]:
     return distance.evaluate(q, q, gradient), gradient
 
 
-@settings(max_examples=150)
+@settings(max_examples=100)
 @given(angles=ANGLES, turn=TURNS, axis=DIRECTIONS, shift=DIRECTIONS, freedom=FREEDOMS)
 def test_gradient_is_the_derivative_however_far_is_left_to_turn(
     mixed: Arm,
