@@ -254,7 +254,7 @@ class DensityRegulation(FieldRegulation):
         path = path or self._to_alone(self.goal)
         if goal_distance is None:
             weighted = TorusDistance(arm, density.weights)
-            goal_distance = InertiaDistance(arm, path.waypoints[-1]) if plain else weighted
+            goal_distance = InertiaDistance(arm, self.goal) if plain else weighted
         self._goal_distance = goal_distance
         self._pose_distance: PoseDistance | None = None
         goals, led_by = SubGoals(self._check, path, sensing), self._distance_to(self.goal)

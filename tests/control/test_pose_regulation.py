@@ -84,7 +84,7 @@ class Circling:
         self.up = np.cross(side / np.linalg.norm(side), self.out)
         self.regulation = DensityRegulation(world, self.first, **changes)
 
-    def goal(self, t: float) -> tuple[Pose, Array]:
+    def at(self, t: float) -> tuple[Pose, Array]:
         c, s = np.cos(t), np.sin(t)  # of a radius of 0.1 m
         step = 0.1 * np.array([(c - 1.0) * self.out + s * self.up, c * self.up - s * self.out])
         shift, twist = np.pad(step, ((0, 0), (0, 3)))
@@ -92,7 +92,7 @@ class Circling:
 
     def torque(self, t: float, q: ArrayLike, v: ArrayLike) -> Array:
         if t >= self.next - 1e-9:
-            self.regulation.set_goal(*self.goal(t))
+            self.regulation.set_goal(*self.at(t))
             self.next += 0.01
         return self.regulation.torque(t, q, v)
 
@@ -112,7 +112,7 @@ def test_servoes_through_a_nearly_singular_posture_among_obstacles() -> None:
     assert run.outcome == Outcome.TIMED_OUT
     assert np.abs(run.q[:, 2]).min() < 0.2  # of the elbow: stretched at 0
     off = [
-        PoseDistance(arm, controller.goal(t)[0]).off(q)
+        PoseDistance(arm, controller.at(t)[0]).off(q)
         for t, q in zip(run.time[1000::20], run.q[1000::20], strict=True)
     ]
     assert np.array(off)[:, 0].max() < 1e-3
