@@ -355,7 +355,7 @@ class DensityRegulation(FieldRegulation):
         self._pose_distance.set_pose(goal)
         return self._pose_distance
 
-    def _checked(self, goal: ArrayLike | Pose) -> Array | Pose:
+    def _checked(self, goal: ArrayLike | Pose) -> Any:
         if isinstance(goal, Pose):
             for name, given in self._joint_space_alone.items():
                 if given:
