@@ -58,7 +58,7 @@ class PoseDistance:
 
     def __init__(self, arm: Arm, pose: Pose) -> None:
         self._arm, self._data = arm, arm.model.createData()
-        self._x, self._slope = np.zeros(12), np.zeros((12, arm.nv))
+        self._x, self._slope, self._name = np.zeros(12), np.zeros((12, arm.nv)), ""
         self.set_pose(pose)
 
     def set_pose(self, pose: Pose) -> None:
@@ -68,12 +68,14 @@ class PoseDistance:
             UnknownNameError: as for the class.
             InvalidValueError: as for the class.
         """
-        model = self._arm.model
-        frame = frame_index(model, pose.frame)
-        if model.frames[frame].parentJoint == 0:
-            allowed = f"one that a joint of {self._arm.name!r} moves"
-            raise InvalidValueError("frame", pose.frame, allowed)
-        self._frame, placement = frame, pose.placement
+        if pose.frame != self._name:  # looking it up takes as long as V
+            model, name = self._arm.model, pose.frame
+            frame = frame_index(model, name)
+            if model.frames[frame].parentJoint == 0:
+                allowed = f"one that a joint of {self._arm.name!r} moves"
+                raise InvalidValueError("frame", name, allowed)
+            self._frame, self._name = frame, name
+        placement = pose.placement
         self._position = placement.translation - self._arm.origin
         self._axes: Array = np.array(placement.rotation.T)
         weights = [0.5 * (pose.free is None) + (pose.free == name) for name in AXES]
@@ -115,7 +117,8 @@ class PoseDistance:
         """
         rate = np.empty(12)
         rate[:3] = twist[:3] / LENGTH
-        rate[3:] = (self._roots[:, np.newaxis] * np.cross(twist[3:], self._axes)).ravel()
+        turning = self._axes @ pin.skew(twist[3:]).T
+        rate[3:] = (self._roots[:, np.newaxis] * turning).ravel()
         return self._solved(rate)
 
     def off(self, q: Array) -> tuple[float, float]:
