@@ -229,6 +229,17 @@ def test_moving_goal(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixt
 
 
 @pytest.mark.slow
+def test_pose_servo(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    run_example(monkeypatch, "pose_servo.py")
+    clearance, off = (
+        [float(word) for word in re.findall(r"[0-9.]+", line)]
+        for line in capsys.readouterr().out.splitlines()
+    )
+    assert 0.0 < clearance[0] < 60.0
+    assert off[1] < 1.0
+
+
+@pytest.mark.slow
 def test_pose_goal(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
     run_example(monkeypatch, "pose_goal.py")
     ways, run, certified, error = capsys.readouterr().out.splitlines()

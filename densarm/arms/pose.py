@@ -1,7 +1,7 @@
 """Pose: where a frame of an arm shall be, in whole or in part."""
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -96,6 +96,14 @@ class Pose:
     def placement(self) -> pin.SE3:
         """The pose as Pinocchio has it, without a turn where any will do."""
         return pin.XYZQUATToSE3(np.array([*self.position, *(self.orientation_xyzw or _NO_TURN)]))
+
+    def moved(self, step: Array) -> "Pose":
+        """Return the pose moved by a step (6,), linear [m] and a turn [rad], both in the world."""
+        position, turned = np.add(self.position, step[:3]), self.orientation_xyzw
+        if turned is not None:
+            turn = pin.exp3(step[3:]) @ self.placement.rotation
+            turned = tuple(pin.Quaternion(turn).normalized().coeffs().tolist())
+        return replace(self, position=tuple(position.tolist()), orientation_xyzw=turned)
 
     def __str__(self) -> str:
         where = ", ".join(f"{x:.4g}" for x in self.position)

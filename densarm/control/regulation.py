@@ -2,13 +2,14 @@
 
 import math
 from collections.abc import Callable, Sequence
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from densarm.arms.arm import Arm
 from densarm.arms.dynamics import Kinematics
+from densarm.arms.pose import Pose
 from densarm.control.controller import Gains, checked_state
 from densarm.control.disturbance_observer import FREE_INERTIA, ActuationParameters
 from densarm.control.evasion import Evasion
@@ -23,6 +24,7 @@ from densarm.control.speed_law import SpeedLaw, SpeedParameters
 from densarm.control.stopping import BackupFilter
 from densarm.density.goal_distance import GoalDistance, InertiaDistance, TorusDistance
 from densarm.density.navigation_density import DensityParameters
+from densarm.density.pose_distance import PoseDistance
 from densarm.density.sub_goals import GuidedDensity, GuidePath, SubGoals
 from densarm.density.unsafe_sets import SensingParameters, UnsafeSet
 from densarm.errors import InvalidValueError
@@ -89,7 +91,7 @@ class FieldRegulation:
         self._field = field
         self._speed_law = speed_law
         self._gain = gains.velocity
-        self._goal_velocity = np.zeros(arm.nv)  # zero unless a subclass knows of one
+        self._at_rest = np.zeros(arm.nv)
         self._scale = 0.0
         if inertia_at is not None:
             self._scale = 1.0 / float(arm.mass_matrix(inertia_at).diagonal().max())
@@ -162,10 +164,14 @@ class FieldRegulation:
     def _limited(self, q: Array, metric: Array | None) -> Array:
         velocity, way_left = self._field.velocity(q, metric)
         velocity = self._speed_law.limit(q, velocity, self._field.distances, way_left)
-        if not self._goal_velocity.any():
+        with_goal = self._goal_velocity()
+        if not with_goal.any():
             return velocity
-        with_goal = velocity + self._goal_velocity
-        return self._speed_law.limit(q, with_goal, self._field.distances, math.inf)
+        return self._speed_law.limit(q, velocity + with_goal, self._field.distances, math.inf)
+
+    def _goal_velocity(self) -> Array:
+        """Return the velocity (nv,) that goes with the goal, from where the field was evaluated."""
+        return self._at_rest
 
 
 class DensityRegulation(FieldRegulation):
@@ -188,15 +194,19 @@ class DensityRegulation(FieldRegulation):
     Where obstacles move the arm gives way to them, as `Evasion` says, k(q) being the velocity that
     is wanted.
 
+    Where the goal is a pose, V is a `PoseDistance`, ∇ρ is taken in its metric, and ℓ is the length
+    of its step: the arm is led to no configuration, and where the pose is out of reach as near to
+    it as the density leads.
+
     Args:
         world: the arm among obstacles.
-        goal: configuration (nq,).
-        path: sub-goals that lead there, as `plan_path` finds them; None for the goal alone.
+        goal: configuration (nq,), or a pose.
+        path: sub-goals to a configuration, as `plan_path` finds them; None for the goal alone.
         plain: whether in the plain form.
         margin: safety margin m of the pairs [m].
         gains: K_p and K_v.
         period: time between two calls [s].
-        goal_distance: V; None for a `TorusDistance`, or an `InertiaDistance` in the plain form.
+        goal_distance: V of configurations; by default `TorusDistance`, `InertiaDistance` if plain.
         unsafe_sets: what else must not be entered, beside pairs of bodies and joint limits.
         density: α, θ, gauge and blend, and the weights of a `TorusDistance`.
         sensing: sensing distances.
@@ -205,11 +215,12 @@ class DensityRegulation(FieldRegulation):
         evasion: makes what gives way to obstacles that move, as the class `Evasion`.
 
     Attributes:
-        goal: as given (nq,), or where it has moved to.
+        goal: as given (nq,), or where it has moved to; or the pose.
 
     Raises:
-        InvalidValueError: a goal that touches something or is outside limits, or a density that is
-            singular or flat at the goal.
+        InvalidValueError: a goal that touches something or is outside limits, a density that is
+            singular or flat at the goal, or a path, the plain form or a blend towards a pose.
+        UnknownNameError: a pose of an unknown frame.
 
     Source: [ZNV] eq. 11, 17 and section V-C, the speed law in place of the saturation of eq. 14.
     """
@@ -217,7 +228,7 @@ class DensityRegulation(FieldRegulation):
     def __init__(
         self,
         world: World,
-        goal: ArrayLike,
+        goal: ArrayLike | Pose,
         *,
         path: GuidePath | None = None,
         plain: bool = False,
@@ -236,19 +247,21 @@ class DensityRegulation(FieldRegulation):
         arm = world.arm
         self._check = SweptCheck(world, margin)
         self._sensing = sensing
-        self.goal: Array = self._checked(goal)
-        path = path or self._to_goal_alone()
+        self._joint_space_alone = {"plain": plain, "density.blend_radius": density.blend_radius}
+        self.goal: Any = self._checked(goal)
+        if path is not None and isinstance(goal, Pose):
+            raise InvalidValueError("path", "sub-goals", "None where the goal is a pose")
+        path = path or self._to_alone(self.goal)
         if goal_distance is None:
             weighted = TorusDistance(arm, density.weights)
             goal_distance = InertiaDistance(arm, self.goal) if plain else weighted
-        goals = SubGoals(self._check, path, sensing)
-        self._guided = GuidedDensity(self._check, goals, goal_distance, density, tuple(unsafe_sets))
+        self._goal_distance = goal_distance
+        self._pose_distance: PoseDistance | None = None
+        goals, led_by = SubGoals(self._check, path, sensing), self._distance_to(self.goal)
+        self._guided = GuidedDensity(self._check, goals, led_by, density, tuple(unsafe_sets))
         self._density_field = _DensityField(self._guided, gains.rate)
-        self._given_goal, self._given_velocity, self._given_time = (
-            self.goal,
-            np.zeros(arm.nv),
-            math.nan,
-        )
+        self._given_goal, self._given_velocity, self._given_time = self.goal, np.zeros(0), math.nan
+        self._moves = False
         inertia_at = path.waypoints[-1] if plain else None
         law = SpeedLaw(world, margin, speed)
         gives_way = None
@@ -258,28 +271,33 @@ class DensityRegulation(FieldRegulation):
             arm, self._density_field, law, gains, period, inertia_at, actuation, gives_way
         )
 
-    def set_goal(self, goal: ArrayLike, velocity: ArrayLike | None = None) -> None:
+    def set_goal(self, goal: ArrayLike | Pose, velocity: ArrayLike | None = None) -> None:
         r"""Lead to another goal from the next call on, without sub-goals.
 
         Where the goal moves, its velocity is added to the planning system, and the speed law
-        limits the sum: :math:`k + \dot q_{goal}` follows it without a lag.
+        limits the sum: :math:`k + \dot q_{goal}` follows it without a lag. That of a pose is a
+        twist, which is followed by the velocity that `PoseDistance.following` has for it.
 
         Args:
-            goal: configuration (nq,) that it has at the next call.
-            velocity: at which it goes on from there (nv,) [rad/s or m/s], for 0.1 s, after which it
-                rests unless it was set again; None for a goal at rest.
+            goal: configuration (nq,), or pose, that it has at the next call.
+            velocity: at which it goes on from there (nv,) [rad/s or m/s], or of a pose (6,), linear
+                [m/s] and angular [rad/s], both in the world; for 0.1 s, after which it rests unless
+                it was set again; None for a goal at rest.
 
         Raises:
             InvalidValueError: as for the class, or a velocity of another length or not finite; the
                 old goal is kept then.
+            UnknownNameError: as for the class.
         """
-        checked, moves = self._checked(goal), np.zeros(self._arm.nv)
-        if velocity is not None:
-            moves = finite_vector("velocity", velocity, self._arm.nv)
+        checked = self._checked(goal)
+        size = 6 if isinstance(checked, Pose) else self._arm.nv
+        moves = np.zeros(size) if velocity is None else finite_vector("velocity", velocity, size)
+        density, led_by = self._guided.density, self._distance_to(checked)
+        if led_by is not density.goal_distance or not isinstance(checked, Pose):
+            self._guided.lead_along(SubGoals(self._check, self._to_alone(checked), self._sensing))
+            density.goal_distance = led_by
         self.goal = self._given_goal = checked
-        self._given_velocity, self._given_time = moves, math.nan
-        self._goal_velocity[:] = 0.0
-        self._guided.lead_along(SubGoals(self._check, self._to_goal_alone(), self._sensing))
+        self._given_velocity, self._given_time, self._moves = moves, math.nan, False
 
     def torque(self, t: float, q: ArrayLike, v: ArrayLike) -> Array:
         """Act as `Controller.torque`."""
@@ -298,9 +316,19 @@ class DensityRegulation(FieldRegulation):
         if not t >= self._given_time:
             self._given_time = t
         since = min(t - self._given_time, _GOES_ON)
-        self._goal_velocity[:] = self._given_velocity if since < _GOES_ON else 0.0
-        self.goal = self._arm.integrate(self._given_goal, since * self._given_velocity)
-        self._guided.move_goal(self.goal)
+        self._moves, step = since < _GOES_ON, since * self._given_velocity
+        if isinstance(self._given_goal, Pose):
+            self.goal = self._given_goal.moved(step)
+            self._distance_to(self.goal)
+        else:
+            self.goal = self._arm.integrate(self._given_goal, step)
+            self._guided.move_goal(self.goal)
+
+    def _goal_velocity(self) -> Array:
+        led_by = self._guided.density.goal_distance
+        if self._moves and isinstance(led_by, PoseDistance):
+            return led_by.following(self._given_velocity)
+        return self._given_velocity if self._moves else self._at_rest
 
     @property
     def remark(self) -> str:
@@ -311,10 +339,28 @@ class DensityRegulation(FieldRegulation):
         """Return, as a phrase, why the density leads nowhere from q (nq,), and what blocks it."""
         return self._guided.describe_stall(q)
 
-    def _to_goal_alone(self) -> GuidePath:
-        return GuidePath(np.tile(inside_limits(self._check, self.goal), (2, 1)), is_clear=False)
+    def _to_alone(self, goal: Array | Pose) -> GuidePath:
+        """Return the way to a goal alone; that to a pose is the field's to lay."""
+        if isinstance(goal, Pose):
+            limits = self._check.arm.limits
+            goal = self._check.arm.configuration(np.clip(0.0, limits.lower, limits.upper))
+        return GuidePath(np.tile(inside_limits(self._check, goal), (2, 1)), is_clear=False)
 
-    def _checked(self, goal: ArrayLike) -> Array:
+    def _distance_to(self, goal: Array | Pose) -> GoalDistance:
+        """Return V of a goal, the one of all poses pointed at it."""
+        if not isinstance(goal, Pose):
+            return self._goal_distance
+        if self._pose_distance is None:
+            self._pose_distance = PoseDistance(self._check.arm, goal)
+        self._pose_distance.set_pose(goal)
+        return self._pose_distance
+
+    def _checked(self, goal: ArrayLike | Pose) -> Any:
+        if isinstance(goal, Pose):
+            for name, given in self._joint_space_alone.items():
+                if given:
+                    raise InvalidValueError(name, given, "left out where the goal is a pose")
+            return goal
         q = self._check.arm.check_configuration("goal", goal)
         if fault := infeasibility(self._check, {"goal": q}):
             raise InvalidValueError("goal", q, f"one that can be held, and clear ({fault})")
@@ -337,6 +383,9 @@ class _DensityField:
         """Act as `VelocityField.velocity`, and move on along the sub-goals."""
         guided = self._guided
         guided.update(q)
+        if isinstance(to_pose := guided.density.goal_distance, PoseDistance):
+            metric = to_pose.metric
+            guided.move_goal(guided.world.arm.integrate(q, to_pose.step()))
         to_sub_goal, beyond = guided.way_left(q)
         if guided.is_critical():
             return self._leaving(q), to_sub_goal + beyond

@@ -2,10 +2,12 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from densarm.arms.pose import Pose
 from densarm.certificates.task import (
     PLANTS,
     REACHED_POSITION,
@@ -15,6 +17,7 @@ from densarm.certificates.task import (
     Task,
 )
 from densarm.control.controller import Controller, VelocityController
+from densarm.density.pose_distance import PoseDistance
 from densarm.errors import InvalidValueError
 from densarm.simulation.disturbances import Disturbances, Signals
 from densarm.simulation.plants import PinocchioPlant, Plant, SingleIntegrator
@@ -30,6 +33,9 @@ from densarm.world.world import World
 OnProgress = Callable[[str], None]
 """Told in a phrase what is being done."""
 
+REACHED_POSE = (1e-3, 0.01)
+"""Largest errors of a pose that is a goal [m, rad]."""
+
 _HELD_SHARE = 0.5  # the loop ends well inside the bound on position at the goal
 _STALL_MOTION = 0.01  # [rad or m] within the stall time
 _PROGRESS_INTERVAL = 200  # steps
@@ -40,7 +46,7 @@ def simulate(
     world: World,
     controller: Controller | VelocityController,
     start: ArrayLike,
-    goal: ArrayLike | None = None,
+    goal: ArrayLike | Pose | None = None,
     *,
     plant: Plant | str | None = None,
     disturbances: Disturbances | None = None,
@@ -53,7 +59,8 @@ def simulate(
     It ends where the arm has held the goal, where it touches something, where it rests away from
     the goal for too long, or when the time is up. Obstacles with a motion move along, from time
     zero on; the world is left as it is in the end. A goal is taken to be the controller's own
-    attribute `goal`; without any the run ends by contact or time.
+    attribute `goal`; without any the run ends by contact or time. A pose counts as held within
+    0.5 mm and 0.005 rad, and the configuration that holds it is the goal of the record then.
 
     Args:
         world: the arm among obstacles, as they are now, or in motion.
@@ -61,7 +68,7 @@ def simulate(
             attributes `goal`, `motion`, `is_moving`, `tracking_error`, `remark` and
             `describe_stall`, if any, tell what it wants, how long it moves, and why it rests.
         start: configuration (nq,).
-        goal: configuration (nq,); None for the controller's own.
+        goal: configuration (nq,), or pose; None for the controller's own.
         plant: what is driven; None or "pinocchio" for the arm's model, "mujoco" for the same in
             MuJoCo.
         disturbances: how the plant differs from the arm's model, which no controller is told; None
@@ -74,6 +81,7 @@ def simulate(
         The recorded run. Whatever happened is its `outcome`, not an exception.
 
     Raises:
+        UnknownNameError: a pose of an unknown frame.
         InvalidValueError: start or goal is not a configuration, a plant of another time step or an
             unknown input or name, a controller without the method for it, a torque that is not
             one, or disturbances that a plant of one's own does not have.
@@ -84,7 +92,8 @@ def simulate(
         driven = plant_of(world, plant or PLANTS[0], parameters, disturbances or Disturbances())
     else:
         driven = plant
-    wanted = getattr(controller, "goal", None) if goal is None else goal
+    wanted: Any = getattr(controller, "goal", None) if goal is None else goal
+    wanted, pose = (None, wanted) if isinstance(wanted, Pose) else (wanted, None)
     told = getattr(driven, "input", Input.TORQUE)
     task = Task(
         arm=world.arm,
@@ -95,7 +104,7 @@ def simulate(
         simulation=parameters,
         input=Input(one_of("input of the plant", told, list(Input))),
     )
-    return simulate_task(task, world, controller, driven, disturbances, on_progress)
+    return simulate_task(task, world, controller, driven, disturbances, on_progress, pose)
 
 
 def plant_of(
@@ -116,8 +125,11 @@ def simulate_task(
     plant: Plant | None = None,
     disturbances: Disturbances | None = None,
     on_progress: OnProgress = lambda _: None,
+    pose: Pose | None = None,
 ) -> Run:
     """Run a controller on a task; as `simulate`, which makes the task.
+
+    A task without a goal may have a pose for it.
 
     None for a plant is the task's, or for a task of velocities the arm that has them.
     """
@@ -144,7 +156,8 @@ def simulate_task(
     if fault := infeasibility(SweptCheck(world, task.margin), {"start": task.start}):
         return Run.at_rest(task, world, Outcome.INFEASIBLE, fault)
     signals = Signals(told, world.arm, parameters.dt)
-    return _Loop(task, world, controller, driven, signals).run(on_progress)
+    to_pose = None if pose is None else PoseDistance(world.arm, pose)
+    return _Loop(task, world, controller, driven, signals, to_pose).run(on_progress)
 
 
 @dataclass(eq=False)
@@ -156,6 +169,7 @@ class _Loop:
     controller: Controller | VelocityController
     plant: Plant
     signals: Signals
+    to_pose: PoseDistance | None
     q: list[Array] = field(default_factory=list)
     v: list[Array] = field(default_factory=list)
     clearance: list[float] = field(default_factory=list)
@@ -193,8 +207,10 @@ class _Loop:
                 rest, rested_since = q, k
             if held * p.dt >= p.hold_time:
                 outcome, detail = Outcome.REACHED, ""
+                task = replace(task, goal=task.goal if self.to_pose is None else q)
                 break
-            if task.goal is not None and (k - rested_since) * p.dt >= p.stall_time:
+            has_goal = self.to_pose is not None or task.goal is not None
+            if has_goal and (k - rested_since) * p.dt >= p.stall_time:
                 outcome, detail = Outcome.STUCK, self._describe_rest(q)
                 break
             if k % _PROGRESS_INTERVAL == 0:
@@ -245,9 +261,15 @@ class _Loop:
         return f"{touching or told} ({told}, smallest distance {1e3 * distance:.3g} mm by coal)"
 
     def _is_at_goal(self, q: Array, v: Array) -> bool:
-        if self.task.goal is None or np.abs(v).max() > REACHED_VELOCITY:
+        if np.abs(v).max() > REACHED_VELOCITY:
             return False
-        return self._distance(self.task.goal, q) <= _HELD_SHARE * REACHED_POSITION
+        if self.to_pose is not None:
+            position, turn = self.to_pose.off(q)
+            return max(position / REACHED_POSE[0], turn / REACHED_POSE[1]) <= _HELD_SHARE
+        return (
+            self.task.goal is not None
+            and self._distance(self.task.goal, q) <= _HELD_SHARE * REACHED_POSITION
+        )
 
     def _distance(self, q_a: Array, q_b: Array) -> float:
         """Return the largest difference of a joint [rad or m]."""

@@ -122,3 +122,15 @@ def test_a_far_base_counts(panda: Arm) -> None:
     with pytest.raises(InvalidValueError):
         far.pose(np.zeros(3))
     assert found.frame == HAND
+
+
+def test_a_pose_is_moved_in_the_axes_of_the_world() -> None:
+    pose = Pose("tip", [1.0, 2.0, 3.0], DOWN, "z")
+    step = np.array([0.1, 0.2, 0.3, 0.0, 0.0, 0.5 * np.pi])
+    moved = pose.moved(step)
+    np.testing.assert_allclose(moved.position, [1.1, 2.2, 3.3])
+    expected = pin.exp3(step[3:]) @ pose.placement.rotation
+    np.testing.assert_allclose(moved.placement.rotation, expected, atol=1e-12)
+    assert (moved.frame, moved.free) == ("tip", "z")
+    alone = Pose("tip", [1.0, 2.0, 3.0]).moved(step)
+    assert alone.orientation_xyzw is None
