@@ -17,10 +17,10 @@ from densarm.certificates.task import (
 )
 from densarm.values.arrays import Array
 from densarm.values.documented import documented
-from densarm.world.near_pairs import smallest_distances
+from densarm.world.near_pairs import NearPairs, smallest_distances
 from densarm.world.stopping import StoppingCheck, StoppingTrajectory
 from densarm.world.swept_check import SweptCheck, SweptResult, SweptVerdict
-from densarm.world.world import World
+from densarm.world.world import DISTANCE_TOLERANCE, World
 
 REPLAY_TOLERANCE = 1e-9
 """Largest difference of a replayed state from the recorded one [rad, rad/s or m, m/s]."""
@@ -87,7 +87,8 @@ def certify(
     replayed that is disturbed, or MuJoCo's.
 
     With a reference and a tube, as in `Run` too, one more part: whatever keeps as near to the
-    reference, or to a stopping trajectory from it, is clear, and this run does.
+    reference, or to a stopping trajectory from it, is clear, and this run does. With a declared
+    speed, one more: nothing of that speed could reach the arm before it could be at rest.
     """
     world = World(task.arm, task.scene)
     checks = [
@@ -100,6 +101,8 @@ def certify(
     ]
     if reference is not None and tube is not None:
         checks.append(_tube(task, world, q, reference, tube))
+    if task.passive_speed is not None:
+        checks.append(_passive(task, world, task.passive_speed, q, v))
     return Certificate(tuple(checks))
 
 
@@ -306,6 +309,42 @@ def _tube(task: Task, world: World, q: Array, reference: Array, tube: Array) -> 
         detail = f"does not apply: clear {within}, which the run left; {used}"
         return Check("tube", None, detail, 1.0 - share, k * dt)
     return Check("tube", True, f"clear {within}; {used}", 1.0 - share, k * dt)
+
+
+def _passive(task: Task, world: World, speed: float, q: Array, v: Array) -> Check:
+    """Prove that what moves at a speed [m/s], whatever way it goes, meets the arm at rest alone.
+
+    Of the recorded motions only where things are at each sample is believed.
+    """
+    dt, moves = task.simulation.dt, world.has_motion
+    if not moves.any():
+        return Check("passive", None, "does not apply: no obstacle moves", None, 0.0)
+    if not (fastest := world.fastest_obstacle) <= speed * (1.0 + _ROUNDING):
+        detail = f"an obstacle may have {fastest:.3g} m/s, and {speed:.3g} m/s are declared"
+        return Check("passive", False, detail, None, 0.0)
+    fast = np.maximum(np.abs(v), np.abs(np.vstack([v[1:], v[-1:]])))  # until the next sample
+    duration = StoppingTrajectory(task.arm).durations(q, v)
+    need = (0.5 * duration[:, np.newaxis] * np.abs(v) + dt * fast) @ world.lipschitz.T
+    need += (speed * (duration + dt) + task.margin + DISTANCE_TOLERANCE)[:, np.newaxis]
+    moving = np.flatnonzero(~(fast.max(axis=1) <= REACHED_VELOCITY))
+    near, least, at, failing = NearPairs(world), np.inf, 0, 0
+    for k in moving:
+        world.set_time(float(k * dt))
+        limit = np.where(moves, need[k] + max(least, 0.0), -np.inf)
+        pairs, distance = near.below(q[k], limit)
+        spare = float((distance - need[k, pairs]).min(initial=np.inf))
+        spare = spare if np.isfinite(need[k]).all() else -np.inf
+        failing += not spare > 0.0
+        if not spare >= least:
+            least, at = spare, int(k)
+    told = f"what moves by up to {speed:.3g} m/s"
+    if failing:
+        detail = f"{told} could reach the moving arm at t = {at * dt:.3f} s; {failing} of {len(q)}"
+        return Check("passive", False, f"{detail} samples fail", _finite(least), at * dt)
+    detail = f"at rest before {told} can reach it, from {len(moving)} samples in motion"
+    if np.isfinite(least):
+        detail += f", {least * 1e3:.3g} mm to spare at t = {at * dt:.3f} s"
+    return Check("passive", True, detail, _finite(least), at * dt)
 
 
 def _nearest(distance: float, at: float) -> str:

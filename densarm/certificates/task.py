@@ -112,6 +112,9 @@ class Task:
     title: str = "run"
     margin: float = 0.0
     """Safety margin m that planning and control keep [m]; the certificate proves no contact."""
+    passive_speed: float | None = None
+    """Declared speed that what moves does not exceed [m/s], before which the arm claims to come to
+    rest; None where nothing is claimed of that."""
     kappa: float = 1.0
     """κ of the goal distance."""
     density: DensityParameters = field(default_factory=DensityParameters)
@@ -128,6 +131,8 @@ class Task:
 
     def __post_init__(self) -> None:
         one_of("plant", self.plant, PLANTS)
+        if self.passive_speed is not None:
+            positive("passive_speed", self.passive_speed)
         for key in ("start", "goal"):
             if getattr(self, key) is not None:
                 q = self.arm.check_configuration(f"{key} configuration", getattr(self, key))
@@ -152,7 +157,8 @@ class Task:
     def to_json(self) -> dict[str, Any]:
         """Return JSON data that suffices to rebuild the task; `from_json` is its inverse."""
         goal = None if self.goal is None else self.arm.angles(self.goal).tolist()
-        control = {**self.settings.get("control", {}), "margin": self.margin, "kappa": self.kappa}
+        control = dict(self.settings.get("control", {}))
+        control |= {key: getattr(self, key) for key in ("margin", "kappa", "passive_speed")}
         return {
             **self.settings,
             "format": FORMAT,
@@ -192,6 +198,7 @@ class Task:
                 title=str(data["title"]),
                 margin=float(control["margin"]),
                 kappa=float(control["kappa"]),
+                passive_speed=control.get("passive_speed"),
                 input=Input(data.get("input", Input.TORQUE)),
                 plant=str(data.get("plant", PLANTS[0])),
                 disturbances=dict(data.get("disturbances", {})),

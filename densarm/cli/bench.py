@@ -207,7 +207,8 @@ def motionbenchmaker(problems: Path, every: int, **options: Any) -> None:
     "--methods",
     default="density,damper_qp,stop_and_go",
     show_default=True,
-    help="What gives way, separated by commas; also density_near, without looking ahead.",
+    help="What gives way, separated by commas; also density_near, without looking ahead, and "
+    "passive, which rests before anything of the balls' speed can reach it.",
 )
 @click.option("--resting", is_flag=True, help="The arm is to stay where it is.")
 @number_option("--jobs", 1, "Processes.")

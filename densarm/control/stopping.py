@@ -89,6 +89,13 @@ class StopAndHold:
         self.dynamics.set_bandwidth(min(self._bandwidth, _GENTLE_BANDWIDTH))
         self.dynamics.move_to(q, v, self._known)
 
+    def lead(self, q: Array, step: float) -> None:
+        """Move where the arm is held by a step [rad or m] at most towards q (nq,), straight."""
+        if self._rest is not None:
+            way = self._arm.difference(self._rest, q)
+            share = min(1.0, step / max(float(np.abs(way).max()), step))
+            self._rest = self._arm.integrate(self._rest, share * way)
+
     def torque(self, q: Array, v: Array, dt: float) -> Array:
         """Return the torque (nv,) [N·m or N] at q (nq,) and v (nv,), dt [s] after the last call."""
         self._time, self._time_left = self._time + dt, self._time_left - dt

@@ -208,9 +208,9 @@ class DensityTracking:
 
     def pause(self) -> None:
         """Let the reference's clock come to rest, so that the arm rests on the motion."""
-        self._numbers[_WANTED_RATE] = 0.0
+        self._numbers[WANTED_RATE] = 0.0
 
-    def resume(self, q: ArrayLike | None = None, within: float | Array = math.inf) -> bool:
+    def resume(self, q: ArrayLike | None = None, within: float | Array = 1e9) -> bool:
         """Let the reference go on after a pause, or after the arm was stopped by another.
 
         Args:
@@ -228,13 +228,13 @@ class DensityTracking:
             if not off[nearest].max() <= 1.0:
                 return False
             self._numbers[_GOES_ON_FROM] = nearest * self.motion.period
-        self._numbers[_WANTED_RATE] = 1.0
+        self._numbers[WANTED_RATE] = 1.0
         return True
 
     @property
     def is_paused(self) -> bool:
         """Whether the reference was made to pause, and rests."""
-        return self._numbers[_WANTED_RATE] == 0.0 and bool(self._numbers[_RATE] < _PAUSED)
+        return self._numbers[WANTED_RATE] == 0.0 and bool(self._numbers[_RATE] < _PAUSED)
 
     @property
     def dynamics(self) -> InverseDynamics:
@@ -292,7 +292,7 @@ _POSITION, _VELOCITY, _ACCELERATION, _ERROR, _WEIGHTS, _MOST = 0, 1, 2, 3, 4, 5 
 # Numbers of the kernel: the reference's time σ, how far it is behind, and its derivatives, which
 # are kept as they were at the last time asked for.
 _TIME, _LAG, _RATE, _CHANGE, _EMERGENCY, _LAST, _GOES_ON_FROM = 0, 1, 2, 3, 4, 5, 6
-_PERIOD, _DELAY, _KAPPA, _POSITION_GAIN, _VELOCITY_GAIN, _WANTED_RATE = 7, 8, 9, 10, 11, 12
+_PERIOD, _DELAY, _KAPPA, _POSITION_GAIN, _VELOCITY_GAIN, WANTED_RATE = 7, 8, 9, 10, 11, 12
 _N_NUMBERS, _KEPT = 13, 12  # how many, and how far behind the clock its copy is
 
 _EVADED_SHARE = 0.5  # of twice the acceleration limits, with which a return to the reference stops
@@ -381,7 +381,7 @@ def _tracking_torque(
     robust_torque(damping, elapsed, late, arrays)
     send(arrays)
     waiting = max(largest - _FREE_ERROR, 0.0) / _WAITING_ERROR
-    wanted = numbers[_WANTED_RATE] * math.sqrt(max(left, _LEAST_SHARE)) / (1.0 + waiting * waiting)
+    wanted = numbers[WANTED_RATE] * math.sqrt(max(left, _LEAST_SHARE)) / (1.0 + waiting * waiting)
     step = min(_CLOCK_RATE * elapsed, 1.0)
     change = numbers[_CHANGE] + step * (_CLOCK_RATE * (wanted - rate) - 2.0 * numbers[_CHANGE])
     if wanted == 0.0:

@@ -14,6 +14,7 @@ from densarm.certificates.records import (
     record_rantzer,
 )
 from densarm.control.controller import Controller
+from densarm.control.passive import PassiveTracking
 from densarm.control.regulation import DensityRegulation
 from densarm.control.replanning import Replanning
 from densarm.control.tracking import DensityTracking
@@ -236,14 +237,11 @@ def _drive(scenario: Scenario, world: World, start: Array, guide: Guide | None) 
             raise
         motion = error.motion  # the arm goes as far as the density leads, which the record shows
     distance = TorusDistance(scenario.arm, kappa=control.kappa)
-    tracking = DensityTracking(
-        world,
-        motion,
-        gains=scenario.law_gains,
-        goal_distance=distance,
-        actuation=scenario.actuation,
-        **law,
-    )
+    law |= {"gains": scenario.law_gains, "goal_distance": distance, "actuation": scenario.actuation}
+    if control.passive_speed is None:
+        tracking: Controller = DensityTracking(world, motion, **law)
+    else:
+        tracking = PassiveTracking(world, motion, control.passive_speed, **law)
     return Drive(tracking, motion.plan_time, motion, motion.path, motion.goal)
 
 

@@ -78,6 +78,9 @@ class ControlParameters:
     """Distance that paths keep beyond m, less in narrow spaces and near start and goal [m]."""
     kappa: float = 1.0
     """κ of the goal distance, between product and sum; the plain form has the sum."""
+    passive_speed: float | None = None
+    """Passive safety in tracking: the arm rests before anything that moves, up to this speed [m/s],
+    can reach it, and evades nothing; None for evasion."""
     planning_alpha: float = PLANNING_ALPHA
     """α of the planning system where its curve is tracked."""
 
@@ -87,6 +90,11 @@ class ControlParameters:
         non_negative("margin", self.margin)
         non_negative("path_margin", self.path_margin)
         positive("planning_alpha", self.planning_alpha)
+        if self.passive_speed is not None:
+            positive("passive_speed", self.passive_speed)
+            if self.form != ControlForm.TRACKING:
+                allowed = f"left out, or form 'tracking', not {str(self.form)!r}"
+                raise InvalidValueError("passive_speed", self.passive_speed, allowed)
         if not self.kappa >= KAPPA_MIN:
             raise InvalidValueError("kappa", self.kappa, f"a number >= {KAPPA_MIN}, or infinity")
 
@@ -194,6 +202,7 @@ class Scenario:
             **{key: getattr(self, key) for key in _SHARED},
             margin=self.control.margin,
             kappa=self.control.kappa,
+            passive_speed=self.control.passive_speed,
             input=Input.VELOCITY if self.control.form == ControlForm.VELOCITY else Input.TORQUE,
             disturbances=self.disturbances.given,
             settings={
@@ -214,7 +223,8 @@ class Scenario:
         if task.goal is None:
             raise InvalidValueError("goal", None, "given in a scenario")
         settings = task.settings
-        control = {**settings.get("control", {}), "margin": task.margin, "kappa": task.kappa}
+        own = {key: getattr(task, key) for key in ("margin", "kappa", "passive_speed")}
+        control = {**settings.get("control", {}), **own}
         if task.input == Input.VELOCITY:
             control["form"] = ControlForm.VELOCITY
         tables = {**settings, "control": control}

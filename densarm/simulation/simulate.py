@@ -65,8 +65,9 @@ def simulate(
     Args:
         world: the arm among obstacles, as they are now, or in motion.
         controller: called at each control period, with the time since the run began. Its
-            attributes `goal`, `motion`, `is_moving`, `tracking_error`, `remark` and
-            `describe_stall`, if any, tell what it wants, how long it moves, and why it rests.
+            attributes `goal`, `motion`, `is_moving`, `tracking_error`, `remark`, `describe_stall`
+            and `passive_speed`, if any, tell what it wants, how long it moves, why it rests, and
+            before what it comes to rest.
         start: configuration (nq,).
         goal: configuration (nq,), or pose; None for the controller's own.
         plant: what is driven; None or "pinocchio" for the arm's model, "mujoco" for the same in
@@ -101,6 +102,7 @@ def simulate(
         start=world.arm.check_configuration("start", start),
         goal=None if wanted is None else world.arm.check_configuration("goal", wanted),
         title=title,
+        passive_speed=getattr(controller, "passive_speed", None),
         simulation=parameters,
         input=Input(one_of("input of the plant", told, list(Input))),
     )

@@ -12,6 +12,7 @@ import pinocchio as pin
 from densarm.arms.arm import Arm, load_arm
 from densarm.certificates.task import REACHED_POSITION, REACHED_VELOCITY
 from densarm.control.evasion import Evasion, EvasionParameters
+from densarm.control.passive import PassiveTracking
 from densarm.control.tracking import DensityTracking
 from densarm.errors import DensarmError
 from densarm.planning.motion import Motion, PlanningError
@@ -118,13 +119,20 @@ class StopAndGo(Evasion):
 _DAMPER, _DAMPER_REACH, _DAMPER_MARGIN = 3.0, 0.5, 0.02  # [1/s], [m], [m]
 _STOP_DISTANCE = 0.3  # [m]
 
-METHODS: Mapping[str, Callable[..., Evasion]] = {
-    "density": Evasion,
-    "density_near": partial(Evasion, parameters=EvasionParameters(horizon=0.0)),
-    "damper_qp": DamperEvasion,
-    "stop_and_go": StopAndGo,
+
+def _passive(world: World, motion: Motion) -> PassiveTracking:
+    return PassiveTracking(world, motion, world.fastest_obstacle)
+
+
+_NEAR = partial(Evasion, parameters=EvasionParameters(horizon=0.0))
+METHODS: Mapping[str, Callable[[World, Motion], DensityTracking | PassiveTracking]] = {
+    "density": DensityTracking,
+    "density_near": partial(DensityTracking, evasion=_NEAR),
+    "damper_qp": partial(DensityTracking, evasion=DamperEvasion),
+    "stop_and_go": partial(DensityTracking, evasion=StopAndGo),
+    "passive": _passive,
 }
-"""What gives way in `DensityTracking`; `density_near` looks for no misses ahead."""
+"""What follows a motion; `density_near` looks for no misses ahead."""
 
 
 def run_trials(
@@ -230,7 +238,7 @@ def draw_trial(arm: Arm, obstacles: int, speed: float, seed: int, resting: bool 
 def run_trial(trial: Trial, method: str) -> _End:
     """Run one of `METHODS` until something is touched, or the arm is back."""
     arm, world = trial.arm, World(trial.arm, trial.scene)
-    controller = DensityTracking(world, trial.motion, evasion=METHODS[method])
+    controller = METHODS[method](world, trial.motion)
     plant, pairs, spent = PinocchioPlant(arm, _PERIOD), NearPairs(world), []
     q, v = arm.configurations(trial.motion.position[0]), np.zeros(arm.nv)
     reached = False
