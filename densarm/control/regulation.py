@@ -68,9 +68,10 @@ class FieldRegulation:
     eq. 17 with a constant q_d, its attraction scaled before its damping. d̂ is added to it: what the
     model does not explain, by a `DisturbanceObserver`, whose model has M + D. Else a joint whose
     rotor has several times its inertia would swing, and circle the next sub-goal; D is bounded as
-    in `robust_torque`. Where the arm could no longer stop in the free space ahead, it stops along a
-    straight line. With `inertia_at`, a configuration (nq,) whose largest inertia is the unit of the
-    metric M, gradients are taken in that, so that the torque itself points along them.
+    in `robust_torque`, and zero in a joint whose torque has no rate limit, an ideal one. Where
+    the arm could no longer stop in the free space ahead, it stops along a straight line. With
+    `inertia_at`, a configuration (nq,) whose largest inertia is the unit of the metric M, gradients
+    are taken in that, so that the torque itself points along them.
 
     Source: [ZNV] eq. 17.
     """
@@ -102,7 +103,8 @@ class FieldRegulation:
         self._kinematics = Kinematics(arm)
         self._dynamics = InverseDynamics(arm, limit, self._kinematics, period, actuation)
         late, self._floor = period + actuation.delay, np.zeros(arm.nv)
-        self._most_floor = max(LARGEST_LAG / (gains.velocity * late) - 1.0, 0.0)
+        has_rotor = np.isfinite(arm.limits.torque_rate)
+        self._most_floor = has_rotor * max(LARGEST_LAG / (gains.velocity * late) - 1.0, 0.0)
         self._filter = BackupFilter(arm, speed_law, gains, period)
         self._dynamics.load()
 
