@@ -1,8 +1,10 @@
 """Controllers: joint torque, or velocity, from time and state."""
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Protocol
+from functools import cache
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -11,7 +13,7 @@ from densarm.arms.arm import Arm
 from densarm.values.arrays import Array
 from densarm.values.checks import finite_vector, positive
 from densarm.values.documented import documented
-from densarm.values.kernels import compiled
+from densarm.values.kernels import compiled, entry_point
 
 _FLOAT = np.dtype(np.float64)
 _NO_STATE = np.empty(0)
@@ -79,9 +81,14 @@ def checked_state(arm: Arm, q: ArrayLike, v: ArrayLike) -> tuple[Array, Array]:
         x = y = _NO_STATE
     if not (x.flags.carray and y.flags.carray):  # kernels would be compiled for read-only arrays
         x, y = x.copy(), y.copy()
-    if x.shape == (arm.nq,) and y.shape == (arm.nv,) and _is_state(x, y, arm.joint_index):
+    if x.shape == (arm.nq,) and y.shape == (arm.nv,) and _state_kernel()(x, y, arm.joint_index):
         return x, y
     return arm.check_configuration("configuration", q), finite_vector("velocity", v, arm.nv)
+
+
+@cache
+def _state_kernel() -> Callable[..., Any]:
+    return entry_point(_is_state, np.zeros(1), np.zeros(1), np.zeros((2, 1), np.int64))
 
 
 @compiled
