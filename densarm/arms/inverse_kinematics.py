@@ -19,6 +19,7 @@ from densarm.arms.models import frame_index
 from densarm.arms.pose import AXES, Pose
 from densarm.errors import InvalidValueError
 from densarm.values.arrays import Array
+from densarm.values.cholesky import factorise, solve_factorised
 from densarm.values.kernels import compiled, compiled_part
 
 _STARTS = 300  # at random
@@ -365,9 +366,10 @@ def _advance(  # noqa: C901  # as it reads
             total = 0.0
             for j in range(nv):
                 total += jacobian[r, j] * jacobian[s, j]
-            square[r, s] = total
+            square[s, r] = total
         square[r, r] += _DAMPING * error * error + _LEAST_DAMPING
-    _solve_in_place(square, e)
+    factorise(square, square)
+    solve_factorised(square, e)
     for j in range(nv):
         step[j] = wish[j]
         for r in range(6):
@@ -380,23 +382,3 @@ def _advance(  # noqa: C901  # as it reads
         longest = max(longest, abs(moved - angles[j]))
         angles[j] = moved
     return longest
-
-
-@compiled_part
-def _solve_in_place(square: Array, b: Array) -> None:
-    """Solve for b, given the lower triangle of a positive definite matrix, by Cholesky."""
-    n = b.size
-    for i in range(n):
-        for k in range(i + 1):
-            total = square[i, k]
-            for m in range(k):
-                total -= square[i, m] * square[k, m]
-            square[i, k] = math.sqrt(total) if i == k else total / square[k, k]
-    for i in range(n):
-        for m in range(i):
-            b[i] -= square[i, m] * b[m]
-        b[i] /= square[i, i]
-    for i in range(n - 1, -1, -1):
-        for m in range(i + 1, n):
-            b[i] -= square[m, i] * b[m]
-        b[i] /= square[i, i]

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from densarm.arms.arm import Arm
 from densarm.values.arrays import Array
 from densarm.values.checks import non_negative
+from densarm.values.cholesky import factorise, solve_factorised
 from densarm.values.documented import documented
 from densarm.values.kernels import compiled_part
 
@@ -175,7 +176,7 @@ def observe(  # noqa: C901  # one kernel, since every call has its cost
         numbers[ELAPSED] = dt
     angle, velocity, disturbance = rows[ANGLE], rows[VELOCITY], rows[DISTURBANCE]
     acceleration, innovation = rows[_ACCELERATION], rows[_INNOVATION]
-    _factorise(mass, factor)
+    factorise(mass, factor)
     _write_free_inertia(factor, acceleration, rows[FREE_INERTIA])
     is_new = begins or dt != 0.0
     for i in range(nv):
@@ -198,7 +199,7 @@ def observe(  # noqa: C901  # one kernel, since every call has its cost
     pole = math.exp(-min(numbers[_BANDWIDTH], 1.0 / (dt + delay)) * dt)
     for i in range(nv):
         acceleration[i] = sent[acting, i] + disturbance[i] - rows[_NONLINEAR, i]
-    _solve(factor, acceleration)
+    solve_factorised(factor, acceleration)
     for i in range(nv):
         predicted = velocity[i] + dt * acceleration[i]
         learn = min(1.0 - pole, math.sqrt(rows[_JITTER, i] * dt / mass[i, i]))
@@ -222,7 +223,7 @@ def observe(  # noqa: C901  # one kernel, since every call has its cost
     for k in range(acting + 1, size):
         for i in range(nv):
             acceleration[i] = sent[k, i] + disturbance[i] - nonlinear[i]
-        _solve(factor, acceleration)
+        solve_factorised(factor, acceleration)
         for i in range(nv):
             rows[AHEAD_ANGLE, i] += dt * (rows[AHEAD_VELOCITY, i] + 0.5 * dt * acceleration[i])
             rows[AHEAD_VELOCITY, i] += dt * acceleration[i]
@@ -239,21 +240,6 @@ def _position(q: Array, joint_index: NDArray[np.int64], i: int) -> float:
 
 
 @compiled_part
-def _factorise(mass: Array, factor: Array) -> None:
-    """Write the Cholesky factor L of M (nv, nv), of which the upper triangle is read."""
-    for j in range(mass.shape[0]):
-        square = mass[j, j]
-        for k in range(j):
-            square -= factor[j, k] * factor[j, k]
-        factor[j, j] = math.sqrt(square)
-        for i in range(j + 1, mass.shape[0]):
-            entry = mass[j, i]
-            for k in range(j):
-                entry -= factor[i, k] * factor[j, k]
-            factor[i, j] = entry / factor[j, j]
-
-
-@compiled_part
 def _write_free_inertia(factor: Array, column: Array, out: Array) -> None:
     """Write 1 / (M⁻¹)_ii (nv,), by the columns of L⁻¹."""
     n = out.shape[0]
@@ -266,17 +252,3 @@ def _write_free_inertia(factor: Array, column: Array, out: Array) -> None:
             column[j] = entry / factor[j, j]
             square += column[j] * column[j]
         out[i] = 1.0 / square
-
-
-@compiled_part
-def _solve(factor: Array, x: Array) -> None:
-    """Replace x (nv,) by M⁻¹ x."""
-    n = x.shape[0]
-    for i in range(n):
-        for k in range(i):
-            x[i] -= factor[i, k] * x[k]
-        x[i] /= factor[i, i]
-    for i in range(n - 1, -1, -1):
-        for k in range(i + 1, n):
-            x[i] -= factor[k, i] * x[k]
-        x[i] /= factor[i, i]

@@ -1,11 +1,10 @@
 """The point of a box nearest to a wanted one, by rows that hold as far as they can."""
 
-import math
-
 import numpy as np
 from numpy.typing import NDArray
 
 from densarm.values.arrays import Array
+from densarm.values.cholesky import factorise, solve_factorised
 from densarm.values.kernels import compiled, compiled_part
 
 _ROUNDS = 60
@@ -162,20 +161,12 @@ def _way_down(
 def _newton_step(hessian: Array, gradient: Array, is_free: NDArray[np.bool_], step: Array) -> None:
     """Write the step of the free coordinates, by Cholesky's method; others stay."""
     n = step.size
-    factor = np.empty((n, n))
+    square = np.empty((n, n))
     for i in range(n):
         step[i] = -gradient[i] if is_free[i] else 0.0
         for j in range(i + 1):
-            total = 1.0 if i == j else 0.0
+            square[j, i] = 1.0 if i == j else 0.0
             if is_free[i] and is_free[j]:
-                total = hessian[i, j]
-            for k in range(j):
-                total -= factor[i, k] * factor[j, k]
-            factor[i, j] = math.sqrt(total) if i == j else total / factor[j, j]
-        for k in range(i):
-            step[i] -= factor[i, k] * step[k]
-        step[i] /= factor[i, i]
-    for i in range(n - 1, -1, -1):
-        for k in range(i + 1, n):
-            step[i] -= factor[k, i] * step[k]
-        step[i] /= factor[i, i]
+                square[j, i] = hessian[i, j]
+    factorise(square, square)
+    solve_factorised(square, step)
