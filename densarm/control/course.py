@@ -34,7 +34,7 @@ class PausingController(Controller, Protocol):
         """Let the reference come to rest on its motion."""
         ...
 
-    def resume(self, q: ArrayLike | None = None, within: float | Array = 1e9) -> bool:
+    def resume(self, q: ArrayLike | None = None, within: float | Array = np.inf) -> bool:
         """Let it go on from where it paused, or from near q (nq,); return whether it does."""
         ...
 

@@ -150,10 +150,9 @@ class DensityTracking:
         self._numbers[_PERIOD:_N_NUMBERS] = *constants, 1.0
         self._sample = np.zeros((6, arm.nv))
         own = self._numbers, self._sample, motion.knots, self._dynamics.arrays
-        self._arrays = self._density.log_psi_gradient, *own
+        self._arrays, still = (self._density.log_psi_gradient, *own), np.zeros(arm.nv)
         self._sample[_WEIGHTS] = getattr(distance, "weights", 1.0)
         self._sample[_MOST] = _PAUSE_SHARE * arm.limits.acceleration
-        still = np.zeros(arm.nv)
         self._kernel = entry_point(_tracking_torque, 0.0, self.goal, still, 0.0, *self._arrays)
         for t in (0.0, motion.period, math.nan):  # kernels are loaded before a control loop
             self.torque(t, self.goal, still)
@@ -169,12 +168,13 @@ class DensityTracking:
         q, v = checked_state(self._arm, q, v)
         self._kinematics.update(q)
         self._dynamics.compute_terms(q, v)
-        self._density.update_psi(q)
-        self._act(float(t), q, v)
-        if self._has_own_distance:  # asked again for the reference's time that is known now
+        if self._has_own_distance:  # asked twice, since the first tells the reference's time
+            self._act(float(t), q, v)
             ahead = self.reference_time + self._numbers[_DELAY] * self._numbers[_RATE]
             self._dynamics.rows[ATTRACT] = self._attraction(q, self.motion.sample(ahead).position)
-            self._act(float(t), q, v)
+        else:
+            self._density.update_psi(q)
+        self._act(float(t), q, v)
         if self._evasion.is_needed():
             self._evade(q)
         tau: Array = self._dynamics.rows[TORQUE].copy()
@@ -210,7 +210,7 @@ class DensityTracking:
         """Let the reference's clock come to rest, so that the arm rests on the motion."""
         self._numbers[WANTED_RATE] = 0.0
 
-    def resume(self, q: ArrayLike | None = None, within: float | Array = 1e9) -> bool:
+    def resume(self, q: ArrayLike | None = None, within: float | Array = math.inf) -> bool:
         """Let the reference go on after a pause, or after the arm was stopped by another.
 
         Args:
@@ -223,9 +223,9 @@ class DensityTracking:
         """
         if q is not None:
             wanted = self._arm.configurations(self.motion.position)
-            off = np.abs(self._arm.difference(wanted, np.asarray(q, np.float64))) / within
-            nearest = int(off.max(axis=1).argmin())
-            if not off[nearest].max() <= 1.0:
+            off = np.abs(self._arm.difference(wanted, np.asarray(q, np.float64)))
+            nearest = int((off / np.where(np.isinf(within), 1.0, within)).max(axis=1).argmin())
+            if not (off[nearest] <= within).all():
                 return False
             self._numbers[_GOES_ON_FROM] = nearest * self.motion.period
         self._numbers[WANTED_RATE] = 1.0
