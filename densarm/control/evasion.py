@@ -40,6 +40,10 @@ _WEIGHT = 1e4  # of a row's lack [rad or m]
 _LEAST_SHARE = 1e-5  # of σ, of h where the bump is evaluated
 _LEAST_LEVER = 1e-9  # [m], of a row that some joint can do something about
 
+# Of pairs: whether awake, distances, Jacobian, sign, Lipschitz constants, twists, whether they
+# move, and reach.
+_Now = tuple[NDArray[np.int64], Array, Array, Array, Array, Array, NDArray[np.bool_], Array]
+
 
 @documented
 @dataclass(frozen=True)
@@ -119,12 +123,15 @@ class Evasion:
         self._rows, self._count = np.zeros((size, n + 1)), np.zeros(_TIMES + 1, np.int64)
         self._chosen = np.zeros((size, n + 1))
         self._turn, self._looks = 0, False
-        self._misses = MissesAhead(world, pairs, margin + p.miss)
         limits, turns = arm.limits, arm.continuous
         lower, upper = np.where(turns, -np.inf, limits.lower), np.where(turns, np.inf, limits.upper)
         speed = _LIMIT_SHARE * np.minimum(limits.velocity, _FASTEST)
         self._limits = np.array([lower, upper, speed, _LIMIT_SHARE * limits.acceleration])
+        is_moving, miss = self._is_moving, margin + p.miss
+        self._misses = MissesAhead(world, pairs, is_moving, self._limits, miss)
         self._reaches = np.full((2, world.n_pairs), np.nan)
+        slopes = pairs.kinematics.jacobian, world.sign, world.lipschitz
+        self._now = pairs.state, pairs.rows, *slopes, world.twist, is_moving, pairs.reach
         self._density = np.array([margin, p.distance, p.decay, p.margin, p.reaction])
         self._most, self._none = HELD_SHARE * limits.acceleration, np.zeros(n)
         self.is_needed()  # its kernel is loaded, or compiled, before a control loop
@@ -159,7 +166,7 @@ class Evasion:
             nominal: q̇_nom (nv,), of which only what the bounds allow is returned.
         """
         angles, found = self._arm.angles(q), np.empty(self._arm.nv)
-        self._write_rows(q, v, angles)
+        self._write_rows(v, angles)
         gives_way = _nearest(
             angles, v, nominal, self._limits, self._rows, self._count, self._chosen, found
         )
@@ -175,31 +182,18 @@ class Evasion:
         ahead = self._none if ahead is None else ahead
         _send(dynamics.arrays, wanted, ahead, self._most)
 
-    def _write_rows(self, q: Array, v: Array, angles: Array) -> None:
+    def _write_rows(self, v: Array, angles: Array) -> None:
         """Write ∇h · q̇ ≥ b of all rows, [∇h, b] (nv + 1,), in blocks of the number of pairs."""
-        world, pairs, horizon = self._world, self._pairs, self.parameters.horizon
+        horizon, limits = self.parameters.horizon, self._limits
         self._count[0] = _density_rows(
-            pairs.state,
-            pairs.rows,
-            pairs.kinematics.jacobian,
-            world.sign,
-            world.twist,
-            self._is_moving,
-            self._density,
-            v,
-            self._limits,
-            world.lipschitz,
-            pairs.reach,
-            self._reaches,
-            self._rows,
+            self._now, self._density, v, limits, self._reaches, self._rows
         )
         self._looks = not self._looks and horizon > 0.0
         if self._looks:
             self._turn = self._turn % _TIMES + 1
-            ahead, table = horizon * self._turn / _TIMES, self._rows[self._turn * world.n_pairs :]
-            self._count[self._turn] = self._misses.write(
-                self._is_moving, angles, v, self._limits, ahead, table
-            )
+            table = self._rows[self._turn * self._world.n_pairs :]
+            ahead = horizon * self._turn / _TIMES
+            self._count[self._turn] = self._misses.write(angles, v, ahead, table)
 
 
 @compiled
@@ -274,24 +268,13 @@ def _send(arrays: DynamicsArrays, wanted: Array, ahead: Array, most: Array) -> N
 
 @compiled
 def _density_rows(
-    state: NDArray[np.int64],
-    rows: Array,
-    jacobian: Array,
-    sign: Array,
-    twist: Array,
-    is_moving: NDArray[np.bool_],
-    numbers: Array,
-    v: Array,
-    limits: Array,
-    lipschitz: Array,
-    reach: Array,
-    reaches: Array,
-    table: Array,
+    now: _Now, numbers: Array, v: Array, limits: Array, reaches: Array, table: Array
 ) -> int:
     """Write rows that some velocity in reach may break, and how far what stands is to be awake.
 
     `reaches` are reach as others have it, and as it was written last (2, K) [m].
     """
+    state, rows, jacobian, sign, lipschitz, twist, is_moving, reach = now
     margin, width, decay, extra, reaction = numbers
     count, n = 0, v.size
     fastest, soonest = np.empty(n), 0.0

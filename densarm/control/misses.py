@@ -17,6 +17,9 @@ _LAG = 0.04  # [s] until a velocity that is asked for is reached
 _SOONEST = 0.03  # [s] in which a miss is made good
 _REACH = 0.12  # [m] beyond which a miss is no row
 
+# Of pairs: whether awake, distances, whether they move, Lipschitz constants, twists and changes.
+_Now = tuple[NDArray[np.int64], Array, NDArray[np.bool_], Array, Array, NDArray[np.int64]]
+
 
 class MissesAhead:
     r"""Rows of pairs that would be too near in some time, if arm and obstacles go on as they do.
@@ -29,12 +32,21 @@ class MissesAhead:
     Args:
         world: the pairs.
         pairs: the same, updated by their owner.
+        is_moving: which pairs have an obstacle that moves (K,), kept by its owner.
+        limits: least and largest joint positions, in the first two rows.
         miss: by how much bodies are to miss each other [m].
     """
 
-    def __init__(self, world: World, pairs: ActivePairs, miss: float) -> None:
+    def __init__(
+        self,
+        world: World,
+        pairs: ActivePairs,
+        is_moving: NDArray[np.bool_],
+        limits: Array,
+        miss: float,
+    ) -> None:
         arm, geometry = world.arm, world.geometry_model
-        self._world, self._pairs, self._miss = world, pairs, miss
+        self._world, self._limits, self._miss = world, limits, miss
         self._queries = PairQueries(arm.model, geometry, world.pair_shapes, remembers=False)
         self._places, self._came = shape_positions(self._queries.data), -1
         self._data = arm.model.createData()
@@ -43,43 +55,20 @@ class MissesAhead:
         self._bodies = np.array(np.unique(world.pair_shapes[:, 1], return_index=True)).T
         self._radius, self._there = np.zeros(geometry.ngeoms), np.zeros(arm.nv)
         self._near = np.zeros(world.n_pairs, np.int64)
+        moves = world.lipschitz, world.twist, world.changes
+        self._now = pairs.state, pairs.rows, is_moving, *moves
 
-    def write(
-        self,
-        is_moving: NDArray[np.bool_],
-        angles: Array,
-        v: Array,
-        limits: Array,
-        ahead: float,
-        table: Array,
-    ) -> int:
+    def write(self, angles: Array, v: Array, ahead: float, table: Array) -> int:
         """Write rows [∇h, b] (nv + 1,) for ∇h · q̇ ≥ b into a table, and return how many.
 
         Args:
-            is_moving: of pairs (K,).
             angles: joint positions (nv,) [rad or m].
             v: velocity (nv,) [rad/s or m/s].
-            limits: least and largest joint positions, in the first two rows.
             ahead: τ [s].
             table: rows (at least K, nv + 1).
         """
-        world, pairs, near, there = self._world, self._pairs, self._near, self._there
-        reach = self._miss + _REACH
-        n, turns, came = _may_meet(
-            pairs.state,
-            pairs.rows,
-            is_moving,
-            world.changes,
-            world.lipschitz,
-            world.twist,
-            angles,
-            v,
-            limits,
-            ahead,
-            reach,
-            near,
-            there,
-        )
+        world, near, there, reach = self._world, self._near, self._there, self._miss + _REACH
+        n, turns, came = _may_meet(self._now, angles, v, self._limits, ahead, reach, near, there)
         if not n:
             return 0
         if came != self._came:
@@ -91,16 +80,8 @@ class MissesAhead:
         for shape, k in self._bodies.tolist() if turns else ():
             turn = pin.exp3(ahead * world.twist[k, 3:])
             data.oMg[shape].rotation = turn @ data.oMg[shape].rotation
-        n = _meet(
-            near[:n],
-            self._bodies,
-            world.pair_shapes,
-            self._places,
-            self._radius,
-            world.twist,
-            ahead,
-            reach,
-        )
+        balls = self._bodies, world.pair_shapes, self._places, self._radius, world.twist
+        n = _meet(near[:n], *balls, ahead, reach)
         self._queries.ask(near[:n])
         rows, soon = self._queries.rows, max(ahead - _LAG, _SOONEST)
         return int(
@@ -117,12 +98,7 @@ class MissesAhead:
 
 @compiled
 def _may_meet(
-    state: NDArray[np.int64],
-    rows: Array,
-    is_moving: NDArray[np.bool_],
-    changes: NDArray[np.int64],
-    lipschitz: Array,
-    twist: Array,
+    now: _Now,
     angles: Array,
     v: Array,
     limits: Array,
@@ -137,6 +113,7 @@ def _may_meet(
         How many, whether the obstacle of any of them turns, and the last change of the world that
         an obstacle came with.
     """
+    state, rows, is_moving, lipschitz, twist, changes = now
     count, turns, came, fastest = 0, False, 0, np.abs(v)
     for k in range(state.shape[0]):
         came = max(came, changes[k])

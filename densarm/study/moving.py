@@ -90,7 +90,7 @@ class DamperEvasion(Evasion):
         with a High Number of Degrees of Freedom, ICRA 1987.
     """
 
-    def _write_rows(self, q: Array, v: Array, angles: Array) -> None:  # noqa: ARG002
+    def _write_rows(self, v: Array, angles: Array) -> None:  # noqa: ARG002
         pairs, world, n = self._pairs, self._world, self._arm.nv
         np.maximum(pairs.reach, _DAMPER_REACH, out=pairs.reach)
         near = np.flatnonzero((pairs.state != 0) & (pairs.rows[:, 0] < _DAMPER_REACH))
@@ -112,7 +112,7 @@ class StopAndGo(Evasion):
         near = bool((self._pairs.rows[moving, 0] < _STOP_DISTANCE).any())
         return super().velocity(q, v, 0.0 * nominal if near else nominal)[0], near
 
-    def _write_rows(self, q: Array, v: Array, angles: Array) -> None:
+    def _write_rows(self, v: Array, angles: Array) -> None:
         """Write none."""
 
 
