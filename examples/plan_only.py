@@ -24,21 +24,10 @@ def main(out: Path) -> None:
     np.savetxt(out / "plan_only.csv", rows, "%.9g", ",", header=",".join(header), comments="")
 
     # The shape of ROS's trajectory_msgs/JointTrajectory, without ROS.
-    points = []
-    for time, position, velocity, acceleration in zip(*samples, strict=True):
-        seconds, nanoseconds = divmod(round(1e9 * time), 10**9)
-        points.append(
-            {
-                "positions": position.tolist(),
-                "velocities": velocity.tolist(),
-                "accelerations": acceleration.tolist(),
-                "time_from_start": {"secs": seconds, "nsecs": nanoseconds},
-            }
-        )
-    trajectory = {"joint_names": names, "points": points}
+    trajectory = samples.joint_trajectory(names)
     (out / "plan_only.json").write_text(json.dumps(trajectory), encoding="utf-8")
 
-    print(f"{motion.duration:.2f} s in {len(points)} points of {len(names)} joints")
+    print(f"{motion.duration:.2f} s in {len(samples.time)} points of {len(names)} joints")
     if motion.tube is not None:  # what a robot may lag behind, and still touches nothing
         print(f"proved clear within {motion.tube.min():.4f} rad of it in every joint")
 

@@ -85,7 +85,7 @@ def plan(
             if csv:
                 _write_csv(csv, joints, samples)
             if json:
-                write_json(json, _joint_trajectory(joints, samples))
+                write_json(json, samples.joint_trajectory(joints))
     click.echo(f"{chosen.title}\n")
     if failure is not None:
         click.secho(f"{failure.outcome}: {failure.outcome.description}", fg="red", bold=True)
@@ -117,19 +117,3 @@ def _write_csv(path: Path, joints: Sequence[str], samples: MotionSamples) -> Non
         writer.writerow([float(time), *(float(value) for row in rows for value in row)])
     with atomic_file(path) as file:
         file.write(text.getvalue().encode())
-
-
-def _joint_trajectory(joints: Sequence[str], samples: MotionSamples) -> dict[str, Any]:
-    """Return a trajectory as trajectory_msgs/JointTrajectory has it, without a header."""
-    points = []
-    for time, position, velocity, acceleration in zip(*samples, strict=True):
-        seconds, nanoseconds = divmod(round(1e9 * time), 10**9)
-        points.append(
-            {
-                "positions": position.tolist(),
-                "velocities": velocity.tolist(),
-                "accelerations": acceleration.tolist(),
-                "time_from_start": {"secs": seconds, "nsecs": nanoseconds},
-            }
-        )
-    return {"joint_names": list(joints), "points": points}

@@ -1,9 +1,10 @@
 """Motion: a way to the goal that was planned, timed and proved."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -68,6 +69,21 @@ class MotionSamples(NamedTuple):
     """Joint velocities (N, nv) [rad/s or m/s]."""
     acceleration: Array
     """Joint accelerations (N, nv) [rad/s² or m/s²]."""
+
+    def joint_trajectory(self, joint_names: Sequence[str]) -> dict[str, Any]:
+        """Return them as JSON data in the shape of ROS's trajectory_msgs/JointTrajectory."""
+        points = []
+        for time, position, velocity, acceleration in zip(*self, strict=True):
+            seconds, nanoseconds = divmod(round(1e9 * time), 10**9)
+            points.append(
+                {
+                    "positions": position.tolist(),
+                    "velocities": velocity.tolist(),
+                    "accelerations": acceleration.tolist(),
+                    "time_from_start": {"secs": seconds, "nsecs": nanoseconds},
+                }
+            )
+        return {"joint_names": list(joint_names), "points": points}
 
 
 @documented
