@@ -185,19 +185,19 @@ def _planned(
     non_negative("path_margin", path_margin)
     if isinstance(guide, str):
         one_of("guide", guide, GUIDES)
-    if len(goals) == 1 and not isinstance(goals[0], Pose):
-        if fault := infeasibility(check, {"start": start, "goal": goals[0]}):
-            raise PlanningError(Outcome.INFEASIBLE, fault)
-        return _planned_to(legs, start, goals[0], guide, seed, path_margin, search)
-    if fault := infeasibility(check, {"start": start}):
-        raise PlanningError(Outcome.INFEASIBLE, fault)
-    began = time.perf_counter()
-    found = candidates(check, start, goals, seed, search.solutions, path_margin)
-    chosen = found[: search.goals]
 
     def plan(q: Array, guide: str | Guide, search: PlanningParameters) -> PlannedPath:
         return _planned_to(legs, start, q, guide, seed, path_margin, search)
 
+    only = goals[0] if len(goals) == 1 and not isinstance(goals[0], Pose) else None
+    ends = {"start": start} if only is None else {"start": start, "goal": only}
+    if fault := infeasibility(check, ends):
+        raise PlanningError(Outcome.INFEASIBLE, fault)
+    if only is not None:
+        return plan(only, guide, search)
+    began = time.perf_counter()
+    found = candidates(check, start, goals, seed, search.solutions, path_margin)
+    chosen = found[: search.goals]
     planned = plan_to_any(chosen, guide, search, plan)
     return replace(planned, plan_time=time.perf_counter() - began)
 
