@@ -264,6 +264,20 @@ def test_it_knows_its_motion_goal_and_error(swing_up: Scenario, swing_up_motion:
     assert controller.tracking_error == pytest.approx(0.2)
 
 
+@pytest.mark.parametrize("within", [np.inf, 0.05, [0.05, np.inf]])
+def test_it_goes_on_from_the_nearest_place_on_its_motion(
+    swing_up: Scenario, swing_up_motion: Motion, within: float | list[float]
+) -> None:
+    controller, arm = DensityTracking(swing_up.world, swing_up_motion), swing_up.arm
+    k = len(swing_up_motion.position) // 2
+    q = arm.configuration(swing_up_motion.position[k] + 1e-4)
+    controller.pause()
+    assert controller.resume(q, np.array(within))
+    controller.torque(7.0, q, np.zeros(arm.nv))
+    assert controller.reference_time == pytest.approx(k * swing_up_motion.period, abs=2e-3)
+    assert not controller.resume(arm.configuration(swing_up_motion.position[k] + 1.0), 0.05)
+
+
 # Told as velocities.
 
 
