@@ -3,6 +3,7 @@
 from .arms.arm import Arm as Arm
 from .arms.arm import load_arm as load_arm
 from .arms.free_body import free_body as free_body
+from .arms.line import Line as Line
 from .arms.pose import Pose as Pose
 from .certificates.certificate import Certificate as Certificate
 from .certificates.task import SimulationParameters as SimulationParameters
