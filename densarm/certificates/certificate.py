@@ -106,8 +106,12 @@ def certify(
     return Certificate(tuple(checks))
 
 
-def swept_result(world: World, q: Array, v: Array, dt: float) -> SweptResult:
+def swept_result(
+    world: World, q: Array, v: Array, dt: float, kept: float | Array = 0.0
+) -> SweptResult:
     """Return the swept check of a motion recorded each dt [s], q (N, nq) and v (N, nv).
+
+    Pairs count as apart beyond a distance, each its own (K,), or one for all [m].
 
     Between samples the true motion departs from the chord by at most a Δt²/8, a the largest
     acceleration of the step and its neighbours. Obstacles with a motion are where it has them.
@@ -115,7 +119,7 @@ def swept_result(world: World, q: Array, v: Array, dt: float) -> SweptResult:
     acceleration = np.abs(np.diff(v, axis=0)) / dt
     k = np.arange(len(acceleration))
     around = np.max([acceleration[np.clip(k + by, 0, len(k) - 1)] for by in (-1, 0, 1)], axis=0)
-    return SweptCheck(world).check(
+    return SweptCheck(world, kept=kept).check(
         q, around * dt**2 / 8.0, dt * np.arange(len(q), dtype=np.float64)
     )
 

@@ -34,7 +34,7 @@ def straight_way(check: SweptCheck, start: ArrayLike, line: Line) -> tuple[Guide
     if found.verdict != SweptVerdict.CLEAR:
         reason = f"the {line} is blocked {_blocked(check, points, segment.length, found)}"
         raise PlanningError(Outcome.NO_PATH, reason)
-    return GuidePath(points, is_clear=True, found_by=f"the {line}"), segment
+    return GuidePath(points, is_clear=True, found_by="a straight line"), segment
 
 
 def _blocked(check: SweptCheck, points: Array, length: float, found: SweptResult) -> str:
