@@ -148,7 +148,7 @@ class _Cell:
             return fault
         del self._obstacles[step.body]
         local = self._arm.pose(self._q, step.link).placement.inverse() * obstacle_pose(body)
-        held = Attachment(_placed(body, local), step.link, step.touch_links, step.mass)
+        held = Attachment(_placed(body, local), step.link, mass=step.mass)
         self._hold([*self._arm.description.attachments, held])
         return self._off_support(step)
 
@@ -248,25 +248,27 @@ class _Cell:
         lines, scenario = list(self._lines_after(k)), self._scenario
         if not lines:
             return goal, ""
-        check, faults = SweptCheck(world, scenario.control.margin), dict[str, None]()
+        check, faults = SweptCheck(world, scenario.control.margin), dict[int, str]()
         ways, clear = list[tuple[float, int, Array]](), list[Array]()
         asked = scenario.seed, scenario.planning.solutions, scenario.control.path_margin
         for n, given in enumerate(goal_list(world.arm, goal), start=1):
             try:
                 found = candidates(check, self._q, [given], *asked)
             except PlanningError as error:
-                faults[f"goal {n}: {error.detail}"] = None
+                faults[n] = error.detail
             else:
                 ways += [(way.least_cost, n, way.q) for way in found]
         for _, n, q in sorted(ways, key=lambda way: way[0]):
+            if len(clear) == scenario.planning.goals:
+                break
             if fault := _fault_on(q, lines):
-                faults[f"goal {n}: {fault}"] = None
-            elif len(clear) < scenario.planning.goals:
+                faults.setdefault(n, fault)
+            else:
                 clear.append(q)
-        tried = "; ".join(faults)
+        tried = "; ".join(f"goal {n}: {fault}" for n, fault in faults.items())
         if not clear:
-            raise PlanningError(Outcome.NO_PATH, f"no goal leads on: {tried}")
-        return clear, f"passed over {tried}" if tried else ""
+            raise PlanningError(Outcome.NO_PATH, f"none leads on of {len(ways)} ways to {tried}")
+        return clear, f"passed over ways to {tried}" if tried else ""
 
     def _lines_after(self, k: int) -> Iterator[tuple[Line, SweptCheck]]:
         """Yield the lines right after a step, each with what it must be clear of."""

@@ -110,7 +110,7 @@ def run_by(
     plant: Plant | None = None,
 ) -> Run:
     """Run a scenario's closed loop by any way to drive the arm, or another plant, as `run`."""
-    require_goal(scenario)
+    scenario.require_one_goal()
     began = time.perf_counter()
     world, task = scenario.world, scenario.task
     on_progress("planning")
@@ -190,7 +190,7 @@ def plan(
     Raises:
         PlanningError: there is no motion, with the outcome and the reason.
     """
-    require_goal(scenario)
+    scenario.require_one_goal()
     return plan_motion(
         world or scenario.world,
         scenario.start if start is None else start,
@@ -199,17 +199,6 @@ def plan(
         timing=scenario.timing,
         time_limit=scenario.simulation.time_limit,
     )
-
-
-def require_goal(scenario: Scenario) -> None:
-    """Refuse a scenario of steps, where one motion to a goal is meant.
-
-    Raises:
-        InvalidValueError: it has steps.
-    """
-    if scenario.steps:
-        allowed = "left out: here one motion to a goal is meant (densarm run does steps)"
-        raise InvalidValueError("steps", len(scenario.steps), allowed)
 
 
 def _asked(scenario: Scenario, guide: Guide | str | None) -> dict[str, Any]:

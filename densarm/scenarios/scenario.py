@@ -196,6 +196,16 @@ class Scenario:
         """Return K_p and K_v, as given or as a form of control has them by default."""
         return self.gains or (TRACKING_GAINS if form == ControlForm.TRACKING else Gains())
 
+    def require_one_goal(self) -> None:
+        """Refuse steps, where one motion to a goal is meant.
+
+        Raises:
+            InvalidValueError: it has steps.
+        """
+        if self.steps:
+            allowed = "left out, where one motion to a goal is meant (densarm run does steps)"
+            raise InvalidValueError("steps", len(self.steps), allowed)
+
     @property
     def law_gains(self) -> Gains:
         """K_p and K_v of the scenario's form of control."""
@@ -390,4 +400,5 @@ def _parse_robot(folder: Path, table: _RobotTable) -> Arm:
 
 def with_goal(scenario: Scenario, key: str, value: Any) -> Scenario:
     """Return a scenario with a goal as files have it; errors call it by the key."""
+    scenario.require_one_goal()
     return replace(scenario, goal=read_goal(scenario.arm, key, value), goals=())

@@ -65,8 +65,6 @@ class Attach:
     """Its mass [kg]; 0 leaves it out of the dynamics."""
     support: str | None = None
     """Obstacle that it stands on, which it may touch in the line that follows, but not enter."""
-    touch_links: Sequence[str] = ()
-    """Links that it may touch, besides its own."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "mass", non_negative("mass", self.mass))

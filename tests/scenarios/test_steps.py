@@ -95,7 +95,7 @@ def test_steps_are_in_place_of_a_goal_among_what_stands(tmp_path: Path) -> None:
         load(tmp_path, WAIT, scene=moving)
     with pytest.raises(DensarmError, match=r"control.form = 'regulation': must be 'tracking'"):
         load(tmp_path, WAIT, scene=SCENE + "[control]\nform = 'regulation'\n")
-    with pytest.raises(DensarmError, match="here one motion to a goal is meant"):
+    with pytest.raises(DensarmError, match="left out, where one motion to a goal is meant"):
         plan(load(tmp_path, WAIT))
 
 
