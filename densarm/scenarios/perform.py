@@ -19,6 +19,7 @@ from densarm.control.tracking import DensityTracking
 from densarm.density.goal_distance import TorusDistance
 from densarm.density.navigation_density import DensityParameters
 from densarm.density.sub_goals import GuidePath
+from densarm.errors import InvalidValueError
 from densarm.planning.goals import Goal, candidates, goal_list
 from densarm.planning.motion import Motion, PlanningError
 from densarm.planning.plan import plan_motion
@@ -78,6 +79,8 @@ def run_steps(
         DensarmError: steps that cannot follow one another, or bad input as for `plan_motion`.
     """
     start = world.arm.check_configuration("start", start)
+    if not len(steps):
+        raise InvalidValueError("steps", [], "at least one")
     scenario = Scenario(
         name="steps",
         title=title,

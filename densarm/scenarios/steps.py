@@ -182,14 +182,12 @@ def check_steps(arm: Arm, scene: Scene, steps: Sequence[Step]) -> None:
     Raises:
         UnknownNameError: a body, frame or joint that there is not.
         InvalidValueError: a body taken that is held, or put down that is not, an obstacle that
-            moves or has no end, no motion at all, or a goal that is none.
+            moves or has no end, nothing after the last change, or a goal that is none.
     """
     bodies = {item.name: item for item in scene}
     held = {item.body.name: item.body for item in arm.description.attachments}
     if moving := [item.name for item in scene if item.motion is not None]:
         raise InvalidValueError("steps", moving, "without obstacles that move")
-    if all(isinstance(step, Attach | Detach) for step in steps):
-        raise InvalidValueError("steps", len(steps), "some of which move the arm or gripper")
     for k, step in enumerate(steps):
         name = f"steps[{k}]"
         require_step(name, step)
@@ -204,6 +202,9 @@ def check_steps(arm: Arm, scene: Scene, steps: Sequence[Step]) -> None:
             for goal in goal_list(arm, step.goal, name):
                 if isinstance(goal, Pose):
                     frame_index(arm.model, goal.frame, f"frame of {name}")
+    if isinstance(steps[-1], Attach | Detach):
+        allowed = "one that takes time, a retreat or a wait, so that what it leaves is recorded"
+        raise InvalidValueError("last of steps", str(steps[-1]), allowed)
 
 
 def _exchange(

@@ -98,16 +98,18 @@ def test_no_grasp_leads_on(can_on_a_table: World) -> None:
 
 
 def test_what_is_out_of_hand_is_not_taken(can_on_a_table: World) -> None:
-    run = ended(can_on_a_table, densarm.Wait(0.1), densarm.Attach("can", "panda_hand"))
+    rest = densarm.Wait(0.1)
+    run = ended(can_on_a_table, rest, densarm.Attach("can", "panda_hand"), rest)
     assert (run.outcome, run.certified) == (Outcome.INFEASIBLE, False)
-    assert "step 2 of 2, attach 'can' to 'panda_hand': 'can' is" in run.detail
+    assert "step 2 of 3, attach 'can' to 'panda_hand': 'can' is" in run.detail
     assert "mm away from what moves with 'panda_hand', and may be 10 mm at most" in run.detail
 
 
 def test_what_is_put_down_in_the_air_is_told(
     can_on_a_table: World, carrying_steps: tuple[Step, ...]
 ) -> None:
-    run = ended(can_on_a_table, *carrying_steps[:5], densarm.Detach("can", "table"))
+    put = densarm.Detach("can", "table"), densarm.Wait(0.1)
+    run = ended(can_on_a_table, *carrying_steps[:5], *put)
     assert (run.outcome, run.certified) == (Outcome.INFEASIBLE, False)
     assert "'table' is 100 mm away from 'can', and may be 1 mm at most" in run.detail
 

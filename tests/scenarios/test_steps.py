@@ -77,7 +77,10 @@ def test_a_body_may_touch_its_support_in_the_line_beside_alone() -> None:
         ([WAIT, TAKE.replace(" }", ', support = "shelf" }')], "unknown support of steps[1].attach"),
         ([WAIT, TAKE.replace(" }", ", mass = -1 }")], "steps[1].attach.mass = -1.0: must be a fin"),
         ([WAIT, 'attach = { body = "can_1" }'], "steps[1].attach.link = None: must be given"),
-        ([TAKE], "steps = 1: must be some of which move the arm or gripper"),
+        (
+            [WAIT, TAKE],
+            "last of steps = \"attach 'can_1' to 'panda_hand'\": must be one that takes",
+        ),
     ],
 )
 def test_what_is_no_step(tmp_path: Path, steps: list[str], told: str) -> None:
@@ -101,7 +104,7 @@ def test_steps_are_in_place_of_a_goal_among_what_stands(tmp_path: Path) -> None:
 
 def test_a_floor_is_not_taken(can_on_a_table: World) -> None:
     arm, floor = can_on_a_table.arm, densarm.HalfSpace(name="floor", position=[0.0, 0.0, -1.0])
-    steps = [densarm.Wait(0.1), densarm.Attach("floor", "panda_hand")]
+    steps = [densarm.Attach("floor", "panda_hand"), densarm.Wait(0.1)]
     with pytest.raises(InvalidValueError, match="must be a body that has an end"):
         densarm.run_steps(World(arm, densarm.Scene([floor])), arm.postures["ready"], steps)
 
@@ -110,3 +113,5 @@ def test_what_is_no_step_in_python(can_on_a_table: World) -> None:
     start = can_on_a_table.arm.postures["ready"]
     with pytest.raises(InvalidValueError, match=r"steps\[0\] = 'wait': must be a MoveTo, Line,"):
         densarm.run_steps(can_on_a_table, start, ["wait"])
+    with pytest.raises(InvalidValueError, match=r"steps = \[\]: must be at least one"):
+        densarm.run_steps(can_on_a_table, start, [])
