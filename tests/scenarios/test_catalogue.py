@@ -98,13 +98,25 @@ def test_a_part_is_carried_out_of_a_bin() -> None:
     assert (done.outcome, done.certified) == (Outcome.REACHED, True), done.detail
 
 
-def test_three_cans_are_put_into_a_box() -> None:
-    done = ran("panda_pick_place")
+@pytest.mark.parametrize(
+    ("name", "into", "half", "bodies"),
+    [
+        ("panda_pick_place", "bottom", (0.2, 0.05, 0.07), ("can_1", "can_2", "can_3")),
+        ("ur5_bin_pick", "tray_bottom", (0.15, 0.1, 0.03), ("part_1", "part_2")),
+    ],
+)
+def test_what_is_picked_is_put_where_it_belongs(
+    name: str, into: str, half: tuple[float, ...], bodies: tuple[str, ...]
+) -> None:
+    done = ran(name)
     assert (done.outcome, done.certified) == (Outcome.REACHED, True), done.detail
     last = done.phases[-1]
-    where = {name: pose for name, (_, pose) in body_poses(last.task, last.q[-1]).items()}
-    inside = [
-        np.abs(where["bottom"].actInv(where[f"can_{k}"].translation)) <= [0.2, 0.05, 0.07]
-        for k in (1, 2, 3)
-    ]
-    assert np.all(inside)
+    where = {key: pose for key, (_, pose) in body_poses(last.task, last.q[-1]).items()}
+    for body in bodies:
+        assert (np.abs(where[into].actInv(where[body].translation)) <= half).all()
+
+
+def test_the_second_grasp_in_the_corner_of_a_bin() -> None:
+    remark = ran("ur5_bin_pick").remark
+    assert "passed over ways to goal 1: the line of 'cup' by (0, 0, -0.2) m is blocked" in remark
+    assert "wrist_3_link_0 and bin_right overlap by" in remark
