@@ -20,6 +20,7 @@ from densarm.values.documented import documented
 _SPACING, _TURN = 2.5e-3, 0.02  # [m, rad] at most between poses that joint positions are found for
 _SHORTEST = 1e-4  # [m], of which the direction is known
 _AT_LIMIT = 1e-6  # [rad or m]
+_NO_TURN = 1e-12  # [rad]
 
 
 @documented
@@ -124,14 +125,16 @@ class Segment(NamedTuple):
             Distance from the segment (N,) [m], and the turn from the orientation that it has at
             the nearest point of it (N,) [rad].
         """
-        way = self.end.translation - self.start.translation
-        far, turned = np.empty(len(q)), np.empty(len(q))
-        for k, pose in enumerate(_placements(arm, self.frame, q)):
-            share = (pose.translation - self.start.translation) @ way / (way @ way)
-            nearest = self.placement(float(np.clip(share, 0.0, 1.0)))
-            far[k] = np.linalg.norm(pose.translation - nearest.translation)
-            turned[k] = np.linalg.norm(pin.log3(nearest.rotation.T @ pose.rotation))
-        return far, turned
+        begin, way = self.start.translation, self.end.translation - self.start.translation
+        poses = list(_placements(arm, self.frame, q))
+        points = np.array([pose.translation for pose in poses])
+        share = np.clip((points - begin) @ way / (way @ way), 0.0, 1.0)
+        wanted = self.start.rotation
+        if np.linalg.norm(self.turn) > _NO_TURN:
+            wanted = np.array([self.placement(x).rotation for x in share.tolist()])
+        far = np.linalg.norm(points - begin - share[:, np.newaxis] * way, axis=1)
+        apart = np.linalg.norm(np.array([pose.rotation for pose in poses]) - wanted, axis=(1, 2))
+        return far, 2.0 * np.arcsin(np.minimum(1.0, apart / np.sqrt(8.0)))
 
     def joint_positions(self, arm: Arm, q: Array) -> Array:
         """Return joint positions (N, nv) that lead the frame along it, from q (nq,) on.

@@ -183,10 +183,14 @@ def _swept(task: Task, world: World, q: Array, v: Array) -> Check:
 
 def _start(task: Task, q: Array, v: Array, time: Array) -> Check:
     error = float(np.abs(task.arm.difference(task.start, q[0])).max())
-    speed = float(np.abs(v[0]).max())
+    begun = np.zeros(task.arm.nv) if task.start_velocity is None else task.start_velocity
+    speed = float(np.abs(v[0] - begun).max())
     shift = float(np.abs(time - task.simulation.dt * np.arange(len(time))).max())
     holds = error <= _ROUNDING and speed == 0.0 and shift <= _ROUNDING
-    detail = f"{error:.2g} from the start at {speed:.2g} rad/s, {shift:.2g} s off the time grid"
+    off = f"{shift:.2g} s off the time grid"
+    if begun.any():
+        off = f"at the speed of the phase before, {off}"
+    detail = f"{error:.2g} from the start at {speed:.2g} rad/s, {off}"
     return Check("start", holds, detail, _finite(_ROUNDING - max(error, speed, shift)), 0.0)
 
 

@@ -29,7 +29,7 @@ CONTACT_DEPTH = 5e-4
 """How far a held body may enter, by numbers, what it is lifted from or put on [m]."""
 
 REST_VELOCITY = 1e-3
-"""Largest velocity of a joint at the end of a phase, since the next begins at rest [rad/s, m/s]."""
+"""Largest velocity of a joint where other joints move next, or what is held changes [rad/s]."""
 
 LINE = "line"
 """Key of a task's settings: the segment that a phase says it leads a frame along."""
@@ -60,9 +60,10 @@ def certify_phases(phases: Sequence[Phase]) -> Certificate:
     """Return what is proved about a run of phases.
 
     Each part of their own certificates holds where it does in all of them. Beside these: each phase
-    begins where the last ended, of the same robot, at rest (joined); bodies are held, or put down,
-    where they were (held); frames are led along lines (line); and what a held body may touch it
-    enters by no more than `CONTACT_DEPTH`, on such a line alone (support).
+    begins where the last ended, of the same robot, as fast as that, or at rest where what is held
+    or moves changes (joined); bodies are held, or put down, where they were (held); frames are led
+    along lines (line); and what a held body may touch it enters by no more than `CONTACT_DEPTH`, on
+    such a line alone (support).
     """
     names = dict.fromkeys(check.name for phase in phases for check in phase.certificate.checks)
     merged = (_merged(name, phases) for name in names)
@@ -118,16 +119,25 @@ def _joined(phases: Sequence[Phase]) -> Check:
     fastest, at, before = 0.0, 0.0, 0.0
     for k, (last, after) in enumerate(pairwise(phases), start=2):
         before += last.duration
-        fault = _joint_fault(last, after)
-        speed = float(np.abs(last.v[-1]).max())
-        if not fault and not speed <= REST_VELOCITY:
-            fault = f"at {speed:.2g} rad/s at the end of the one before"
+        fault, speed = _joint_fault(last, after), float(np.abs(last.v[-1]).max())
+        if not fault and last.task.arm.joint_names == after.task.arm.joint_names:
+            jump = float(np.abs(after.v[0] - last.v[-1]).max())
+            fault = "" if jump <= _SAME else f"{jump:.2g} rad/s faster or slower than before"
+        if not fault and not speed <= REST_VELOCITY and _changes(last, after):
+            fault = f"at {speed:.2g} rad/s, at rest for what changes"
         if fault:
             return Check("joined", False, f"phase {k} ({after.task.title}): {fault}", None, before)
-        if speed >= fastest:
+        if speed >= fastest and _changes(last, after):
             fastest, at = speed, before
-    detail = f"each of {len(phases)} phases begins where the last ended, at {fastest:.2g} rad/s"
-    return Check("joined", True, detail, REST_VELOCITY - fastest, at)
+    detail = f"each of {len(phases)} phases begins where the last ended, and changes arm or hold"
+    return Check("joined", True, f"{detail} at {fastest:.2g} rad/s", REST_VELOCITY - fastest, at)
+
+
+def _changes(last: Phase, after: Phase) -> bool:
+    """Return whether other joints move, or other bodies are held, from one phase to the next."""
+    arms = last.task.arm, after.task.arm
+    names = [(arm.joint_names, [x.body.name for x in arm.description.attachments]) for arm in arms]
+    return names[0] != names[1]
 
 
 def _joint_fault(last: Phase, after: Phase) -> str:

@@ -127,6 +127,7 @@ class _Cell:
         self._obstacles = {item.name: item for item in scenario.scene}
         self._arm = Arm(without_mimics(arm.description)) if joints else arm
         self._q: Array = scenario.start
+        self._v = np.zeros(arm.nv)
         own = replace(self._arm.description, attachments=())
         whole = Arm(with_moving(own, joints, {})) if joints else Arm(own)
         bodies = body_poses(scenario.task, self._q).values()
@@ -214,7 +215,7 @@ class _Cell:
         told = Disturbances() if isinstance(step, Grip) else self._scenario.disturbances
         task = replace(task, goal=motion.goal)
         done = simulate_task(task, world, controller, None, told, self._on_progress)
-        self._leave(arm, done.q[-1])
+        self._leave(done)
         path = motion.path or GuidePath(motion.position, is_clear=True)
         remark = "; ".join(filter(None, [passed_over, path.remark, done.remark]))
         found: dict[str, Any] = {"led_by": path.found_by, "stuck": path.stuck, "remark": remark}
@@ -291,6 +292,7 @@ class _Cell:
             "scene": world.scene,
             "start": start,
             "goal": None,
+            "start_velocity": None if isinstance(step, Grip) else self._v,
             "title": str(step),
             "simulation": replace(simulation, hold_time=hold, time_limit=limit),
         }
@@ -323,14 +325,16 @@ class _Cell:
     def _hold(self, held: Sequence[Attachment]) -> None:
         self._arm = Arm(replace(self._arm.description, attachments=tuple(held)))
 
-    def _leave(self, arm: Arm, q: Array) -> None:
-        """Go on from a configuration (nq,) of the arm, or of its gripper."""
+    def _leave(self, run: Run) -> None:
+        """Go on from where a run of the arm, or of its gripper, ended."""
+        arm, q = run.task.arm, run.q[-1]
         if arm.joint_names == self._arm.joint_names:
-            self._q = q
+            self._q, self._v = q, run.v[-1]
             return
         moved = dict(zip(arm.joint_names, arm.angles(q).tolist(), strict=True))
         own = self._arm.description
         self._arm = Arm(replace(own, locked_joints={**own.locked_joints, **moved}))
+        self._v = np.zeros(self._arm.nv)
 
 
 def _fault_on(q: Array, lines: Iterable[tuple[Line, SweptCheck]]) -> str:

@@ -85,7 +85,7 @@ def test_a_phase_begins_where_the_last_ended(
     if "robot" in told:
         ur5 = densarm.load_arm("ur5")
         q = ur5.postures["neutral"]
-        task = replace(phases[LAST].task, arm=ur5, start=q, goal=q)
+        task = replace(phases[LAST].task, arm=ur5, start=q, goal=q, start_velocity=None)
         other = phases[LAST]._replace(task=task, q=q[np.newaxis], v=np.zeros((1, ur5.nv)))
     else:
         other = change(phases[LAST])
@@ -95,9 +95,15 @@ def test_a_phase_begins_where_the_last_ended(
     assert told in joined.detail
 
 
-def test_what_is_held_changes_at_rest_alone(phases: list[Phase]) -> None:
-    fast = phases[1]._replace(v=phases[1].v + 0.002)
-    assert failing([phases[0], fast, *phases[2:]]) == ["joined"]
+def test_what_is_held_or_moves_changes_at_rest_alone(phases: list[Phase]) -> None:
+    fast = phases[LIFT - 1]._replace(v=phases[LIFT - 1].v + 0.002)
+    assert failing([*phases[: LIFT - 1], fast, *phases[LIFT:]]) == ["joined"]
+
+
+def test_no_velocity_is_lost_while_the_arm_is_the_same(phases: list[Phase]) -> None:
+    assert np.abs(phases[1].v[0]).max() > 0.0
+    slower = phases[1]._replace(v=np.vstack([0.0 * phases[1].v[:1], phases[1].v[1:]]))
+    assert failing([phases[0], slower, *phases[2:]]) == ["joined"]
 
 
 def test_a_frame_off_its_line(phases: list[Phase]) -> None:

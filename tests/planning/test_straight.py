@@ -74,6 +74,17 @@ def test_ends_in_the_world_and_along_the_frame() -> None:
     )
 
 
+def test_how_far_a_frame_is_off_a_line() -> None:
+    turned = POSE.moved(np.array([0.0, 0.2, 0.0, 0.0, 0.0, 0.3]))
+    for end, turn in ((turned, 0.05), (POSE.moved(np.array([0.0, 0.2, 0, 0, 0, 0])), 0.2)):
+        segment = Segment("panda_hand_tcp", POSE.placement, end.placement)
+        aside = POSE.moved(np.array([0.003, 0.1, 0.004, 0.0, 0.0, 0.2]))  # half the way along
+        (q,) = WORLD.inverse_kinematics(aside, count=1, near=READY)
+        far, off = segment.off(PANDA, np.array([READY, q]))
+        assert far == pytest.approx([0.0, 0.005], abs=1e-6)
+        assert off == pytest.approx([0.0, turn], abs=1e-6)
+
+
 def test_line_that_cannot_be_followed_says_how_far_and_why() -> None:
     far = refusal(densarm.Line(TCP, [1.3, 0.0, 0.3]))
     assert "the line ends at a pose of 'panda_hand_tcp'" in far
