@@ -162,6 +162,7 @@ class Task:
     def to_json(self) -> dict[str, Any]:
         """Return JSON data that suffices to rebuild the task; `from_json` is its inverse."""
         goal = None if self.goal is None else self.arm.angles(self.goal).tolist()
+        begun = self.start_velocity
         control = dict(self.settings.get("control", {}))
         control |= {key: getattr(self, key) for key in ("margin", "kappa", "passive_speed")}
         return {
@@ -174,7 +175,7 @@ class Task:
             "obstacles": self.scene.to_json(),
             "start": self.arm.angles(self.start).tolist(),
             "goal": goal,
-            "start_velocity": None if self.start_velocity is None else self.start_velocity.tolist(),
+            **({} if begun is None else {"start_velocity": begun.tolist()}),
             "input": str(self.input),
             "plant": self.plant,
             "disturbances": dict(self.disturbances),
