@@ -76,6 +76,16 @@ class PlacedObstacle:
             self.obstacle, self.told = replace(self.obstacle, **pose, motion=None), None
         return self.obstacle
 
+    def after(self, duration: float, origin: Array) -> Obstacle:
+        """Return the obstacle at rest where its velocity leads it, seen from a point as `hold`."""
+        if self.obstacle.motion is None and not self.velocity.any():
+            return self.present()
+        step, now = duration * self.velocity, pin.XYZQUATToSE3(self._pose + origin)
+        turned = pin.SE3(pin.exp3(step[3:]) @ now.rotation, now.translation + step[:3])
+        *position, x, y, z, w = pin.SE3ToXYZQUAT(turned).tolist()
+        pose: dict[str, Any] = {"position": position, "orientation_xyzw": (x, y, z, w)}
+        return replace(self.obstacle, **pose, motion=None)
+
     def checked_pose(self, position: ArrayLike, orientation_xyzw: ArrayLike | None) -> Array:
         """Return a pose (7,) in the world, turned as it is if by None; errors as of an obstacle."""
         turned: Any = self._pose[3:] if orientation_xyzw is None else orientation_xyzw
