@@ -15,6 +15,7 @@ from densarm.certificates.records import (
     record_rantzer,
 )
 from densarm.control.controller import Controller
+from densarm.control.goal_on_obstacle import GoalOnObstacle
 from densarm.control.passive import PassiveTracking
 from densarm.control.regulation import DensityRegulation
 from densarm.control.replanning import PlanningInLoop, Replanning
@@ -24,7 +25,8 @@ from densarm.density.navigation_density import density_towards
 from densarm.planning.guide import Guide, GuidePath, PlannedPath
 from densarm.planning.motion import Motion, PlanningError
 from densarm.planning.plan import GUIDES, inside_limits, plan_motion, plan_path
-from densarm.scenarios.scenario import ControlForm, Scenario, load_scenario
+from densarm.scenarios.control import ControlForm
+from densarm.scenarios.scenario import Scenario, load_scenario
 from densarm.simulation.disturbances import Disturbances
 from densarm.simulation.plants import Plant
 from densarm.simulation.run import Run
@@ -117,9 +119,10 @@ def run_by(
         return replace(ended, plan_time=time.perf_counter() - began if searched else 0.0)
     elapsed = time.perf_counter() - began
     told = scenario.disturbances if plant is None else None
-    if drive.goal is not None:
+    pose = scenario.moving_goal
+    if drive.goal is not None or pose is not None:
         task = replace(task, goal=drive.goal)
-    done = simulate_task(task, world, drive.controller, plant, told, on_progress)
+    done = simulate_task(task, world, drive.controller, plant, told, on_progress, pose)
     if done.outcome == Outcome.INFEASIBLE:
         return done
     done = replace(done, plan_time=drive.plan_time, preparation_time=elapsed)
@@ -145,6 +148,9 @@ def by_density(
         PlanningError: there is no way, or, without a guide's path, the density is stuck at once.
     """
     world = world or scenario.world
+    if (pose := scenario.moving_goal) is not None:
+        law = _law(scenario) | _regulation(scenario)
+        return Drive(GoalOnObstacle(world, pose, scenario.goal_follows, **law))
     found = _planned(scenario, world, scenario.start, guide)
     controller = _controller(scenario, world, found)
     motion = found if isinstance(found, Motion) else None
@@ -235,30 +241,33 @@ def _planned(
 
 def _controller(scenario: Scenario, world: World, planned: PlannedPath | Motion) -> Controller:
     """Return what drives an arm along a plan, in a scenario's form of control."""
-    control = scenario.control
-    law: dict[str, Any] = {
+    control, law = scenario.control, _law(scenario)
+    if isinstance(planned, PlannedPath):
+        law |= _regulation(scenario)
+        is_plain = control.form == ControlForm.PLAIN
+        law["goal_distance"] = None if is_plain else scenario.goal_distance
+        return DensityRegulation(world, planned.goal, path=planned.path, plain=is_plain, **law)
+    law["goal_distance"] = TorusDistance(scenario.arm, kappa=control.kappa)
+    if control.passive_speed is None:
+        return DensityTracking(world, planned, **law)
+    return PassiveTracking(world, planned, control.passive_speed, **law)
+
+
+def _law(scenario: Scenario) -> dict[str, Any]:
+    return {
         "density": scenario.density,
         "sensing": scenario.sensing,
         "gains": scenario.law_gains,
         "actuation": scenario.actuation,
     }
-    if isinstance(planned, PlannedPath):
-        is_plain = control.form == ControlForm.PLAIN
-        return DensityRegulation(
-            world,
-            planned.goal,
-            path=planned.path,
-            plain=is_plain,
-            margin=control.margin,
-            period=scenario.simulation.control_period,
-            goal_distance=None if is_plain else scenario.goal_distance,
-            speed=scenario.speed,
-            **law,
-        )
-    law["goal_distance"] = TorusDistance(scenario.arm, kappa=control.kappa)
-    if control.passive_speed is None:
-        return DensityTracking(world, planned, **law)
-    return PassiveTracking(world, planned, control.passive_speed, **law)
+
+
+def _regulation(scenario: Scenario) -> dict[str, Any]:
+    return {
+        "margin": scenario.control.margin,
+        "period": scenario.simulation.control_period,
+        "speed": scenario.speed,
+    }
 
 
 def records(run: Run) -> tuple[EnergyRecord, RantzerRecord]:

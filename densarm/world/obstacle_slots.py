@@ -165,6 +165,10 @@ class ChangingObstacles:
         """
         return self._slot(name).velocity.copy()
 
+    def obstacle_pose(self, name: str) -> Array:
+        """Return where an obstacle is: x y z [m] and quaternion x y z w (7,); else as above."""
+        return self._slot(name).pose + self._origin
+
     def motion_way(self, begin: float, end: float) -> Array:
         """Return how far a point of each pair's obstacle goes at most between two times [s].
 
