@@ -40,9 +40,7 @@ def test_the_part_is_followed_and_the_run_is_certified(conveyor: Scenario, done:
     assert (rate <= conveyor.arm.limits.torque_rate * (1.0 + 1e-9)).all()
     assert float(done.remark.split(" mm off")[0]) <= 2.0
     assert done.task.goal is not None
-    np.testing.assert_allclose(
-        conveyor.arm.pose(done.task.goal, "tool0").position[1], 0.4, atol=1e-3
-    )
+    assert conveyor.arm.pose(done.task.goal, "tool0").position[1] == pytest.approx(0.4, abs=1e-3)
 
 
 @pytest.mark.slow
@@ -80,5 +78,5 @@ def test_what_no_goal_can_keep_to_is_refused_in_one_line(conveyor: Scenario) -> 
         ({"goal": conveyor.goal, "goals": ()}, r"goal_follows = 'part'.*goal is no pose"),
     ):
         with pytest.raises(DensarmError, match=told) as raised:
-            replace(conveyor, **change)  # type: ignore[arg-type]
+            replace(conveyor, **change)
         assert "\n" not in str(raised.value)
