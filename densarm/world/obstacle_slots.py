@@ -169,6 +169,14 @@ class ChangingObstacles:
         """Return where an obstacle is: x y z [m] and quaternion x y z w (7,); else as above."""
         return self._slot(name).pose + self._origin
 
+    def unseen(self, time: float, longest: float) -> tuple[str, ...]:
+        """Return the names of obstacles whose stream of poses has stopped.
+
+        Those are moved with a time, and were so last more than `longest` before `time` [s]. Where
+        they are is not known any more: a supervisor should stop the arm.
+        """
+        return tuple(n for n, slot in self._present.items() if time - slot.seen_at > longest)
+
     def motion_way(self, begin: float, end: float) -> Array:
         """Return how far a point of each pair's obstacle goes at most between two times [s].
 

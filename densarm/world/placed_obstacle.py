@@ -69,6 +69,11 @@ class PlacedObstacle:
         self.put(pose - origin, obstacle.velocity_at(0.0), None)
         self.gone = self._ways[:] = 0.0
 
+    @property
+    def seen_at(self) -> float:
+        """Time of the last move that had one [s]; not a number where that had none."""
+        return float(self._track[_TIME]) if self._track[_COUNT] > 0.0 else math.nan
+
     def present(self) -> Obstacle:
         """Return the obstacle where it was moved to."""
         if self.told is not None:
