@@ -3,7 +3,7 @@
     densarm bench moving --obstacles 4 --speed 1.5 --trials 200 --json moving_1.5.json
     python benchmarks/moving_figure.py moving_*.json --figure moving.png
 
-Each file is a cell; a panel holds those that differ in speed alone. Bars are Wilson's 95 % intervals.
+Each file is a cell; a panel holds those that differ in speed alone. Bars are intervals of 95 %.
 """
 
 import argparse
