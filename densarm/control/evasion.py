@@ -37,7 +37,7 @@ _STANDING_RATE = 10.0  # [1/s] at which the distance to what stands may shrink
 _BRAKE_SHARE = 0.5  # of the accelerations, that a stop before what stands reckons with
 _REACH_SHARE = 1.1  # of what accelerations reach, since reach is of the next step
 _WEIGHT = 1e4  # of a row's lack [rad or m]
-_FIRMNESS = 10.0  # of rows of what stands, as if they lacked so many times as much
+_FIRMNESS = 30.0  # of rows of what stands, as if they lacked so many times as much
 _LEAST_SHARE = 1e-5  # of σ, of h where the bump is evaluated
 _LEAST_LEVER = 1e-9  # [m], of a row that some joint can do something about
 
@@ -57,7 +57,7 @@ class EvasionParameters:
 
     distance: float = 0.5
     """Sensing distance σ of pairs, whether their obstacle moves or stands [m]."""
-    decay: float = 8.0
+    decay: float = 20.0
     """γ: ln Ψ_k of a pair whose obstacle moves falls by at most this [1/s]."""
     margin: float = 0.01
     """Distance to keep from what moves, beside the motion's own margin [m]."""
@@ -65,7 +65,7 @@ class EvasionParameters:
     """Time for which what comes nearer goes on before the arm has reacted [s]."""
     horizon: float = 0.5
     """How far ahead misses are looked for [s]; zero for not at all."""
-    miss: float = 0.03
+    miss: float = 0.06
     """By how much things that move are to be missed, beside the motion's margin [m]."""
 
     def __post_init__(self) -> None:
@@ -94,7 +94,7 @@ class Evasion:
     take turns. a_k is half of what the accelerations make along ∇h_k, so that the arm stops in time
     where it flees. Bounds on q̇ are those of velocities, of what accelerations reach within 1/K_v,
     and of the way to joint limits. Rows are soft, since not all can hold at times, each measured
-    along its gradient [rad/s or m/s], those of what stands ten times: into a wall no ball may drive
+    along its gradient [rad/s or m/s], those of what stands 30 times: into a wall no ball may drive
     the arm. Bounds hold always. Rows that hold for all velocities in
     reach are left out, and where q̇_nom keeps all there is no problem to solve.
 
