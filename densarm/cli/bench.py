@@ -207,18 +207,38 @@ def motionbenchmaker(problems: Path, every: int, **options: Any) -> None:
     "--methods",
     default="density,damper_qp,stop_and_go",
     show_default=True,
-    help="What gives way, separated by commas; also density_near, without looking ahead, and "
-    "passive, which rests before anything of the balls' speed can reach it.",
+    help="What gives way, separated by commas; also density_near, without looking ahead, passive, "
+    "which rests before anything of the balls' speed can reach it, and, with their packages (pip "
+    "install 'densarm[peers]'), mink and cbfpy.",
 )
 @click.option("--resting", is_flag=True, help="The arm is to stay where it is.")
+@click.option(
+    "--estimated",
+    is_flag=True,
+    help="Velocities are not told, but estimated from positions at 100 Hz that err by 5 mm.",
+)
 @number_option("--jobs", 1, "Processes.")
+@click.option(
+    "--save-dir",
+    type=click.Path(path_type=Path, file_okay=False),
+    help="Keep what came of every run here; those that are here already are not run again.",
+)
 @output_option("--json", "FILE", "Write the figures as JSON.")
-def moving(methods: str, json: Path | None, **options: Any) -> None:
+def moving(
+    methods: str,
+    trials: int,
+    seed: int,
+    jobs: int,
+    save_dir: Path | None,
+    json: Path | None,
+    **options: Any,
+) -> None:
     """Aim balls of 80 mm radius at an arm, by one method after another.
 
     Each ball is aimed at a link where the motion has it, and would hit it. Trials are the same for
     all methods, which differ in what gives way alone. A contact ends a run; it has reached if the
-    arm is at the goal within 4 s after the balls have passed.
+    arm is at the goal within 4 s after the balls have passed. An interrupted benchmark goes on
+    where it was with the same --save-dir.
 
     The exit status is 0 when all trials were run, whatever was touched.
 
@@ -228,12 +248,12 @@ def moving(methods: str, json: Path | None, **options: Any) -> None:
     """  # noqa: D301
     with progress() as report:
         report("loading")
-        from densarm.study.moving import run_trials, to_json
+        from densarm.study.moving import Cell, run_trials, to_json
 
-        chosen = [name.strip() for name in methods.split(",")]
-        outcomes = run_trials(methods=chosen, on_progress=report, **options)
+        cell, chosen = Cell(**options), [name.strip() for name in methods.split(",")]
+        outcomes = run_trials(cell, trials, seed, chosen, jobs, save_dir, report)
         if json:
-            write_json(json, to_json(outcomes))
+            write_json(json, to_json(cell, outcomes))
     rows = [
         {
             "method": method,

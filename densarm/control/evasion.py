@@ -37,6 +37,7 @@ _STANDING_RATE = 10.0  # [1/s] at which the distance to what stands may shrink
 _BRAKE_SHARE = 0.5  # of the accelerations, that a stop before what stands reckons with
 _REACH_SHARE = 1.1  # of what accelerations reach, since reach is of the next step
 _WEIGHT = 1e4  # of a row's lack [rad or m]
+_FIRMNESS = 30.0  # of rows of what stands, as if they lacked so many times as much
 _LEAST_SHARE = 1e-5  # of σ, of h where the bump is evaluated
 _LEAST_LEVER = 1e-9  # [m], of a row that some joint can do something about
 
@@ -56,7 +57,7 @@ class EvasionParameters:
 
     distance: float = 0.5
     """Sensing distance σ of pairs, whether their obstacle moves or stands [m]."""
-    decay: float = 8.0
+    decay: float = 20.0
     """γ: ln Ψ_k of a pair whose obstacle moves falls by at most this [1/s]."""
     margin: float = 0.01
     """Distance to keep from what moves, beside the motion's own margin [m]."""
@@ -64,7 +65,7 @@ class EvasionParameters:
     """Time for which what comes nearer goes on before the arm has reacted [s]."""
     horizon: float = 0.5
     """How far ahead misses are looked for [s]; zero for not at all."""
-    miss: float = 0.03
+    miss: float = 0.06
     """By how much things that move are to be missed, beside the motion's margin [m]."""
 
     def __post_init__(self) -> None:
@@ -93,7 +94,8 @@ class Evasion:
     take turns. a_k is half of what the accelerations make along ∇h_k, so that the arm stops in time
     where it flees. Bounds on q̇ are those of velocities, of what accelerations reach within 1/K_v,
     and of the way to joint limits. Rows are soft, since not all can hold at times, each measured
-    along its gradient [rad/s or m/s]; bounds hold always. Rows that hold for all velocities in
+    along its gradient [rad/s or m/s], those of what stands 30 times: into a wall no ball may drive
+    the arm. Bounds hold always. Rows that hold for all velocities in
     reach are left out, and where q̇_nom keeps all there is no problem to solve.
 
     Args:
@@ -118,9 +120,10 @@ class Evasion:
         self._version, self._way_before = -1, world.obstacle_way.copy()
         self._is_moving, self._is_needed = np.zeros(world.n_pairs, bool), False
         self._ahead = np.array([margin + p.margin + p.distance, p.reaction + p.horizon])
-        n, size = arm.nv, (_TIMES + 1) * world.n_pairs
-        # Blocks of rows of the density, and of misses at each time; how many in each; all in reach.
-        self._rows, self._count = np.zeros((size, n + 1)), np.zeros(_TIMES + 1, np.int64)
+        n, size = arm.nv, (_TIMES + 2) * world.n_pairs
+        # Blocks of rows of what moves, of misses at each time, and of what stands; how many in
+        # each; all in reach.
+        self._rows, self._count = np.zeros((size, n + 1)), np.zeros(_TIMES + 2, np.int64)
         self._chosen = np.zeros((size, n + 1))
         self._turn, self._looks = 0, False
         limits, turns = arm.limits, arm.continuous
@@ -185,7 +188,7 @@ class Evasion:
     def _write_rows(self, v: Array, angles: Array) -> None:
         """Write ∇h · q̇ ≥ b of all rows, [∇h, b] (nv + 1,), in blocks of the number of pairs."""
         horizon, limits = self.parameters.horizon, self._limits
-        self._count[0] = _density_rows(
+        self._count[0], self._count[-1] = _density_rows(
             self._now, self._density, v, limits, self._reaches, self._rows
         )
         self._looks = not self._looks and horizon > 0.0
@@ -249,8 +252,9 @@ def _nearest(
                 lever += slope * slope
             if least < rows[k, n] and lever > _LEAST_LEVER**2:
                 holds &= now >= rows[k, n]
+                scale = (_FIRMNESS if block == count.size - 1 else 1.0) / math.sqrt(lever)
                 for j in range(n + 1):
-                    chosen[some, j] = rows[k, j] / math.sqrt(lever)
+                    chosen[some, j] = scale * rows[k, j]
                 some += 1
     if not holds:
         nearest_in_box(nominal, chosen[:some, :n], chosen[:some, n], low, high, _WEIGHT, found)
@@ -269,14 +273,15 @@ def _send(arrays: DynamicsArrays, wanted: Array, ahead: Array, most: Array) -> N
 @compiled
 def _density_rows(
     now: _Now, numbers: Array, v: Array, limits: Array, reaches: Array, table: Array
-) -> int:
+) -> tuple[int, int]:
     """Write rows that some velocity in reach may break, and how far what stands is to be awake.
 
-    `reaches` are reach as others have it, and as it was written last (2, K) [m].
+    `reaches` are reach as others have it, and as it was written last (2, K) [m]. How many rows of
+    what moves and of what stands there are is returned; the latter are the last block.
     """
     state, rows, jacobian, sign, lipschitz, twist, is_moving, reach = now
     margin, width, decay, extra, reaction = numbers
-    count, n = 0, v.size
+    count, standing, n = 0, table.shape[0] - state.shape[0], v.size
     fastest, soonest = np.empty(n), 0.0
     for j in range(n):
         fastest[j] = abs(v[j]) + _REACH_SHARE * limits[3, j] / EVADING_GAIN
@@ -290,13 +295,13 @@ def _density_rows(
             reach[k] = reaches[1, k] = max(reaches[0, k], margin + min(far, width))
             if state[k] == 0 or h >= far or h >= width:
                 continue
-            row, brake = table[count], 0.0
+            row, brake = table[standing], 0.0
             speed = write_slope(rows[k], jacobian, sign[k], v, row)
             for j in range(n):
                 brake += abs(row[j]) * limits[3, j]
             left = max(h - reaction * max(-speed, 0.0), 0.0)
             row[n] = -min(_STANDING_RATE * left, math.sqrt(2.0 * _BRAKE_SHARE * brake * left))
-            count += 1
+            standing += 1
         elif state[k] != 0:
             rate = pair_rate(rows[k], twist[k])
             h -= extra + reaction * max(-rate, 0.0)
@@ -308,4 +313,4 @@ def _density_rows(
                 write_slope(rows[k], jacobian, sign[k], v, table[count])
                 table[count, n] = least
                 count += 1
-    return count
+    return count, standing - (table.shape[0] - state.shape[0])

@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
-from enum import StrEnum
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -17,14 +16,14 @@ from densarm.control.disturbance_observer import ActuationParameters
 from densarm.control.sensing import require_smooth_goal
 from densarm.control.speed_law import SpeedParameters
 from densarm.control.tracking import TRACKING_GAINS
-from densarm.density.goal_distance import KAPPA_MIN, TorusDistance, joint_weights
+from densarm.density.goal_distance import TorusDistance, joint_weights
 from densarm.density.navigation_density import DensityParameters
 from densarm.density.unsafe_sets import SensingParameters
 from densarm.errors import DensarmError, FileContentError, InvalidValueError, UnknownNameError
 from densarm.planning.goals import candidates, goal_list
 from densarm.planning.guide import PlanningParameters
 from densarm.planning.motion import TimingParameters
-from densarm.planning.plan import GUIDES, PATH_MARGIN, PLANNING_ALPHA
+from densarm.scenarios.control import ControlForm, ControlParameters
 from densarm.scenarios.goal_values import (
     goals_json,
     read_configuration,
@@ -37,69 +36,14 @@ from densarm.scene.scene import Scene
 from densarm.simulation.disturbances import Disturbances
 from densarm.values.arrays import Array
 from densarm.values.checks import (
-    non_negative,
     non_negative_integer,
     one_of,
-    positive,
 )
 from densarm.values.documented import documented
 from densarm.values.files import read_toml
 from densarm.values.tables import parse_table
 from densarm.world.swept_check import SweptCheck
 from densarm.world.world import World
-
-
-class ControlForm(StrEnum):
-    """Which density controller drives the arm."""
-
-    TRACKING = "tracking"
-    """Along the timed trajectory of the planning system, [ZNV] eq. 17."""
-    REGULATION = "regulation"
-    """To the goal by way of the sub-goals, [ZNV] eq. 17 with constant q_d."""
-    PLAIN = "plain"
-    """u = ∇ρ + d(q, q̇)."""
-    VELOCITY = "velocity"
-    """Along the timed trajectory by commanded velocities, which needs no masses of the arm. Those
-    held for several time steps jump beyond the acceleration limits, which is not certified."""
-
-
-@dataclass(frozen=True)
-class ControlParameters:
-    """Which controller, and the guide it follows.
-
-    Raises:
-        InvalidValueError: a value out of its range.
-    """
-
-    form: ControlForm = ControlForm.TRACKING
-    """The controller."""
-    guide: str = "auto"
-    """The guide, unless the caller names another: "auto", "density", "direct" or "path"."""
-    margin: float = 0.0
-    """Safety margin m: a pair is unsafe at this distance and below [m]."""
-    path_margin: float = PATH_MARGIN
-    """Distance that paths keep beyond m, less in narrow spaces and near start and goal [m]."""
-    kappa: float = 1.0
-    """κ of the goal distance, between product and sum; the plain form has the sum."""
-    passive_speed: float | None = None
-    """Passive safety in tracking: the arm rests before anything that moves, up to this speed [m/s],
-    can reach it, and evades nothing; None for evasion."""
-    planning_alpha: float = PLANNING_ALPHA
-    """α of the planning system where its curve is tracked."""
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "form", ControlForm(one_of("form", self.form, list(ControlForm))))
-        one_of("guide", self.guide, GUIDES)
-        non_negative("margin", self.margin)
-        non_negative("path_margin", self.path_margin)
-        positive("planning_alpha", self.planning_alpha)
-        if self.passive_speed is not None:
-            positive("passive_speed", self.passive_speed)
-            if self.form != ControlForm.TRACKING:
-                allowed = f"left out, or form 'tracking', not {str(self.form)!r}"
-                raise InvalidValueError("passive_speed", self.passive_speed, allowed)
-        if not self.kappa >= KAPPA_MIN:
-            raise InvalidValueError("kappa", self.kappa, f"a number >= {KAPPA_MIN}, or infinity")
 
 
 @documented
@@ -155,6 +99,9 @@ class Scenario:
     """What `goal` was chosen from, of which any will do: a plan chooses again."""
     steps: Sequence[Step] = ()
     """What is done, one after another, in place of a motion to the goal; see `run_steps`."""
+    goal_follows: str = ""
+    """Name of the obstacle that the goal keeps to as that moves, a single pose in regulation; empty
+    for one at rest."""
 
     def __post_init__(self) -> None:
         non_negative_integer("seed", self.seed)
@@ -175,6 +122,8 @@ class Scenario:
             if self.control.form != ControlForm.TRACKING or self.control.passive_speed is not None:
                 allowed = "'tracking' without a passive speed, where there are steps"
                 raise InvalidValueError("control.form", str(self.control.form), allowed)
+        if self.goal_follows:
+            self._require_goal_that_follows()
         self.disturbances.require_fit(self.arm)
         one_of("plant", self.plant, PLANTS)
         joint_weights("density.weights", self.arm, self.density.weights)
@@ -187,10 +136,26 @@ class Scenario:
         may_blend = form in {ControlForm.REGULATION, ControlForm.PLAIN}
         require_smooth_goal(self.density, may_blend=may_blend, form=str(form))
 
+    def _require_goal_that_follows(self) -> None:
+        name, form = self.goal_follows, self.control.form
+        if name not in (obstacles := [item.name for item in self.scene]):
+            raise UnknownNameError("obstacle of task.goal_follows", name, obstacles)
+        if len(self.goals) != 1 or not isinstance(self.goals[0], Pose):
+            raise InvalidValueError("task.goal_follows", name, "left out where the goal is no pose")
+        if form != ControlForm.REGULATION:
+            allowed = f"'regulation' where the goal follows {name!r}"
+            raise InvalidValueError("control.form", str(form), allowed)
+
     @cached_property
     def world(self) -> World:
         """The arm among the obstacles, made when first asked for."""
         return World(self.arm, self.scene)
+
+    @property
+    def moving_goal(self) -> Pose | None:
+        """The goal that keeps to an obstacle, where it is at time zero; None for one at rest."""
+        goal = self.goals[0] if self.goal_follows else None
+        return goal if isinstance(goal, Pose) else None
 
     def gains_of(self, form: ControlForm) -> Gains:
         """Return K_p and K_v, as given or as a form of control has them by default."""
@@ -245,6 +210,7 @@ class Scenario:
             settings={
                 "seed": self.seed,
                 **({"goals": goals_json(self.arm, self.goals)} if self.goals else {}),
+                **({"goal_follows": self.goal_follows} if self.goal_follows else {}),
                 **{key: asdict(getattr(self, key)) for key in _SETTINGS},
                 "gains": asdict(self.law_gains),
             },
@@ -268,9 +234,8 @@ class Scenario:
         return cls(
             **{key: getattr(task, key) for key in _SHARED},
             seed=settings.get("seed", 0),
-            goals=tuple(
-                read_one_goal(task.arm, "goals", item) for item in settings.get("goals", ())
-            ),
+            goal_follows=settings.get("goal_follows", ""),
+            goals=tuple(read_one_goal(task.arm, "goals", x) for x in settings.get("goals", ())),
             disturbances=parse_table("disturbances", Disturbances, task.disturbances),
             **{
                 key: parse_table(key, TABLES[key], tables.get(key, {}))
@@ -343,6 +308,7 @@ def _parse(path: Path, data: dict[str, Any]) -> Scenario:
         scene=Scene(scene),
         start=start,
         goal=start if steps else read_goal(arm, "task.goal", task.goal),
+        goal_follows=task.goal_follows,
         steps=steps,
         plant=data.get("plant", PLANTS[0]),
         seed=data.get("seed", 0),
@@ -379,6 +345,7 @@ class _RobotTable:
 class _TaskTable:
     start: str | tuple[float, ...] = ()
     goal: Any = field(default_factory=list)
+    goal_follows: str = ""
 
 
 def _parse_robot(folder: Path, table: _RobotTable) -> Arm:

@@ -1,10 +1,15 @@
 """Moving: an arm among balls that would hit it, by one law of control after another."""
 
+import json
 import time
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import nullcontext
 from dataclasses import asdict, dataclass
 from functools import partial
+from importlib.util import find_spec
 from itertools import product
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pinocchio as pin
@@ -14,18 +19,17 @@ from densarm.certificates.task import REACHED_POSITION, REACHED_VELOCITY
 from densarm.control.evasion import Evasion, EvasionParameters
 from densarm.control.passive import PassiveTracking
 from densarm.control.tracking import DensityTracking
-from densarm.errors import DensarmError
+from densarm.errors import DensarmError, FileContentError
 from densarm.planning.motion import Motion, PlanningError
 from densarm.planning.plan import plan_motion
 from densarm.scene.motion import ConstantVelocity
 from densarm.scene.obstacles import Box, Sphere
 from densarm.scene.scene import Scene
 from densarm.simulation.plants import PinocchioPlant
+from densarm.study.evasions import CbfpyEvasion, DamperEvasion, MinkEvasion, StopAndGo
 from densarm.study.problems import in_processes, named_arm
 from densarm.study.random_problems import Workspace
-from densarm.values.arrays import Array
 from densarm.values.checks import non_negative_integer, one_of, positive, positive_integer
-from densarm.world.distance_view import add_pair_gradients, pair_rates
 from densarm.world.near_pairs import NearPairs
 from densarm.world.world import World
 
@@ -43,6 +47,42 @@ _WAY = 0.6, 1.0  # [m] that a ball goes to an arm at rest
 _PASSING = 0.6  # [m] that balls go on
 _RETURN = 4.0  # [s] for the way back after they passed
 _AT_REST = 0.01  # [rad/s]
+_POSE_PERIOD, _POSE_NOISE = 0.01, 0.005  # [s], [m] in each axis, where velocities are not told
+
+
+@dataclass(frozen=True)
+class Cell:
+    """What trials are drawn alike, but for their seed.
+
+    Raises:
+        UnknownNameError: no such arm.
+        InvalidValueError: a number out of its range.
+        DensarmError: the arm has too few joints.
+    """
+
+    arm: str
+    """A known name; its links are capsules."""
+    obstacles: int
+    """Number of balls; from two on there are a table and a wall beside."""
+    speed: float
+    """Of the balls [m/s]."""
+    resting: bool = False
+    """Whether the arm is to stay where it is."""
+    estimated: bool = False
+    """Whether velocities are estimated from positions at 100 Hz that err by 5 mm."""
+
+    def __post_init__(self) -> None:
+        positive_integer("obstacles", self.obstacles)
+        positive("speed", self.speed)
+        if named_arm(self.arm).nv < _AIMED_FROM:
+            reason = f"balls are aimed at links from joint {_AIMED_FROM} on, and it has none"
+            raise DensarmError(f"robot {self.arm!r}: {reason}")
+
+    @property
+    def name(self) -> str:
+        """Of the file of its trials."""
+        words = [word for word in ("resting", "estimated") if getattr(self, word)]
+        return "_".join([self.arm, str(self.obstacles), f"{self.speed:g}", *words])
 
 
 @dataclass(frozen=True)
@@ -80,46 +120,6 @@ class _End:
     step_us: float
 
 
-class DamperEvasion(Evasion):
-    """The velocity-damper QP: ∇d_k · q̇ + n_k · w_k ≥ -ξ (d_k - m) for pairs within reach.
-
-    ξ = 3 /s, m = 20 mm and a reach of 0.5 m are the best of five settings that were tried; servo,
-    bounds and nominal velocity are those of `Evasion`.
-
-    Source: B. Faverjon, P. Tournassoud, A Local Based Approach for Path Planning of Manipulators
-        with a High Number of Degrees of Freedom, ICRA 1987.
-    """
-
-    def _write_rows(self, v: Array, angles: Array) -> None:  # noqa: ARG002
-        pairs, world, n = self._pairs, self._world, self._arm.nv
-        np.maximum(pairs.reach, _DAMPER_REACH, out=pairs.reach)
-        near = np.flatnonzero((pairs.state != 0) & (pairs.rows[:, 0] < _DAMPER_REACH))
-        rows, table = np.ascontiguousarray(pairs.rows[near]), self._rows[: len(near)]
-        slopes = np.zeros((len(near), n))
-        add_pair_gradients(rows, pairs.kinematics.jacobian, world.sign[near], slopes)
-        table[:, :n] = slopes
-        rate = pair_rates(rows, world.twist[near])
-        table[:, n] = -_DAMPER * (rows[:, 0] - _DAMPER_MARGIN) - rate
-        self._count[0] = len(near)
-
-
-class StopAndGo(Evasion):
-    """Stops while anything that moves is near, and goes on when it is not."""
-
-    def velocity(self, q: Array, v: Array, nominal: Array) -> tuple[Array, bool]:
-        """Act as `Evasion.velocity`."""
-        moving = self._is_moving & (self._pairs.state != 0)
-        near = bool((self._pairs.rows[moving, 0] < _STOP_DISTANCE).any())
-        return super().velocity(q, v, 0.0 * nominal if near else nominal)[0], near
-
-    def _write_rows(self, v: Array, angles: Array) -> None:
-        """Write none."""
-
-
-_DAMPER, _DAMPER_REACH, _DAMPER_MARGIN = 3.0, 0.5, 0.02  # [1/s], [m], [m]
-_STOP_DISTANCE = 0.3  # [m]
-
-
 def _passive(world: World, motion: Motion) -> PassiveTracking:
     return PassiveTracking(world, motion, world.fastest_obstacle)
 
@@ -130,68 +130,96 @@ METHODS: Mapping[str, Callable[[World, Motion], DensityTracking | PassiveTrackin
     "density_near": partial(DensityTracking, evasion=_NEAR),
     "damper_qp": partial(DensityTracking, evasion=DamperEvasion),
     "stop_and_go": partial(DensityTracking, evasion=StopAndGo),
+    "mink": partial(DensityTracking, evasion=MinkEvasion),
+    "cbfpy": partial(DensityTracking, evasion=CbfpyEvasion),
     "passive": _passive,
 }
 """What follows a motion; `density_near` looks for no misses ahead."""
+PEERS = ("mink", "cbfpy")
+"""Methods of other packages of that name."""
 
 
 def run_trials(
-    arm: str,
-    obstacles: int,
-    speed: float,
+    cell: Cell,
     trials: int,
     seed: int,
     methods: Sequence[str],
-    resting: bool = False,
     jobs: int = 1,
+    save_dir: Path | None = None,
     on_progress: Callable[[str], None] = lambda _: None,
 ) -> dict[str, Outcomes]:
-    """Run the same trials by each of some methods, at 1 kHz and with velocities told.
+    """Run the same trials by each of some methods, at 1 kHz.
 
     Args:
-        arm: a known name; its links are capsules.
-        obstacles: number of balls; from two on there are a table and a wall beside.
-        speed: of the balls [m/s].
+        cell: what they are.
         trials: how many; the first stay the same when there are more.
         seed: of the first trial, the next one's is one more.
         methods: of `METHODS`.
-        resting: whether the arm is to stay where it is.
         jobs: processes.
+        save_dir: folder of a file of each cell's runs, which are not run again; None to keep none.
         on_progress: told what is being done.
 
     Raises:
-        UnknownNameError: no such arm.
         InvalidValueError: a number out of its range, or an unknown method.
-        DensarmError: no trial was found in many draws.
+        FileContentError: the folder cannot be made, or holds a file of something else.
+        DensarmError: no trial was found in many draws, or a peer is not installed.
     """
-    for name, value in (("obstacles", obstacles), ("trials", trials)):
-        positive_integer(name, value)
-    positive("speed", speed)
+    positive_integer("trials", trials)
     non_negative_integer("seed", seed)
     for method in methods:
         one_of("methods", method, list(METHODS))
-    named_arm(arm)
+        if method in PEERS and find_spec(method) is None:
+            install = "pip install 'densarm[peers]'"
+            raise DensarmError(f"method {method!r} needs {method}, not installed: {install}")
+    file = save_dir and save_dir / f"{cell.name}.jsonl"
+    ends = _kept(file) if file else {}
     items = list(product(range(seed, seed + trials), methods))
-    ends: dict[str, list[_End]] = {method: [] for method in methods}
-    work = partial(_run, arm, obstacles, speed, resting)
-    for (_, method), end in zip(items, in_processes(work, items, jobs), strict=False):
-        ends[method].append(end)
-        on_progress(f"{sum(map(len, ends.values()))} of {len(items)} runs")
+    missing = [item for item in items if item not in ends]
+    with file.open("a", encoding="utf-8") if file else nullcontext() as kept:
+        found = in_processes(partial(_run, cell), missing, jobs)
+        for count, (item, end) in enumerate(zip(missing, found, strict=False), 1):
+            ends[item] = end
+            if kept:
+                kept.write(json.dumps({"seed": item[0], "method": item[1], **asdict(end)}) + "\n")
+                kept.flush()
+            on_progress(f"{count} of {len(missing)} runs")
     return {
-        method: Outcomes(
-            len(found),
-            sum(end.has_contact for end in found),
-            sum(end.reached for end in found),
-            sum(end.was_moving for end in found),
-            float(np.median([end.step_us for end in found])),
-        )
-        for method, found in ends.items()
+        method: _outcomes([ends[item] for item in items if item[1] == method]) for method in methods
     }
 
 
-def to_json(outcomes: Mapping[str, Outcomes]) -> dict[str, dict[str, dict[str, float]]]:
+def _outcomes(ends: Sequence[_End]) -> Outcomes:
+    return Outcomes(
+        len(ends),
+        sum(end.has_contact for end in ends),
+        sum(end.reached for end in ends),
+        sum(end.was_moving for end in ends),
+        float(np.median([end.step_us for end in ends])),
+    )
+
+
+def _kept(file: Path) -> dict[tuple[int, str], _End]:
+    """Return the runs of a file by seed and method, and make its folder."""
+    ends: dict[tuple[int, str], _End] = {}
+    try:
+        file.parent.mkdir(parents=True, exist_ok=True)
+        lines = file.read_text(encoding="utf-8").splitlines() if file.exists() else []
+        for line in lines:
+            told = json.loads(line)
+            item = told.pop("seed"), told.pop("method")
+            ends[item] = _End(**told)
+    except OSError as error:
+        raise FileContentError(file, error.strerror or "cannot be made") from None
+    except (ValueError, TypeError, LookupError, AttributeError):
+        reason = f"line {len(ends) + 1} is no run of a trial: remove it, or the file"
+        raise FileContentError(file, reason) from None
+    return ends
+
+
+def to_json(cell: Cell, outcomes: Mapping[str, Outcomes]) -> dict[str, dict[str, Any]]:
     """Return JSON data."""
-    return {"methods": {method: asdict(found) for method, found in outcomes.items()}}
+    methods = {method: asdict(found) for method, found in outcomes.items()}
+    return {"cell": asdict(cell), "methods": methods}
 
 
 def draw_trial(arm: Arm, obstacles: int, speed: float, seed: int, resting: bool = False) -> Trial:
@@ -235,14 +263,27 @@ def draw_trial(arm: Arm, obstacles: int, speed: float, seed: int, resting: bool 
     raise DensarmError(f"robot {arm.name!r}: no trial in {_DRAWS} draws")
 
 
-def run_trial(trial: Trial, method: str) -> _End:
-    """Run one of `METHODS` until something is touched, or the arm is back."""
+def run_trial(trial: Trial, method: str, noise: np.random.Generator | None = None) -> _End:
+    """Run one of `METHODS` until something is touched, or the arm is back.
+
+    Args:
+        trial: what is run.
+        method: its name.
+        noise: of positions at 100 Hz, which are all that is told then; None where velocities are
+            told as well, every time.
+    """
     arm, world = trial.arm, World(trial.arm, trial.scene)
-    controller = METHODS[method](world, trial.motion)
+    seen = world if noise is None else World(arm, trial.scene)
+    balls = [item for item in trial.scene if item.motion is not None]
+    controller = METHODS[method](seen, trial.motion)
     plant, pairs, spent = PinocchioPlant(arm, _PERIOD), NearPairs(world), []
     q, v = arm.configurations(trial.motion.position[0]), np.zeros(arm.nv)
-    reached = False
+    reached, every = False, round(_POSE_PERIOD / _PERIOD)
     for k in range(round((trial.passed + _RETURN) / _PERIOD)):
+        if noise is not None and k % every == 0:
+            for ball in balls:
+                there = ball.pose_at(k * _PERIOD).translation + noise.normal(0.0, _POSE_NOISE, 3)
+                seen.move_obstacle(ball.name, there, time=k * _PERIOD)
         begin = time.perf_counter()
         u = controller.torque(k * _PERIOD, q, v)
         spent.append(1e6 * (time.perf_counter() - begin))
@@ -257,20 +298,22 @@ def run_trial(trial: Trial, method: str) -> _End:
     return _End(False, False, reached, float(np.median(spent)))
 
 
-def _run(arm: str, obstacles: int, speed: float, resting: bool, item: tuple[int, str]) -> _End:
+def _run(cell: Cell, item: tuple[int, str]) -> _End:
     seed, method = item
-    return run_trial(_trial(arm, obstacles, speed, seed, resting), method)
+    noise = np.random.default_rng([seed, cell.obstacles, 1]) if cell.estimated else None
+    return run_trial(_trial(cell, seed), method, noise)
 
 
-def _trial(arm: str, obstacles: int, speed: float, seed: int, resting: bool) -> Trial:
-    key = arm, obstacles, speed, seed, resting
+def _trial(cell: Cell, seed: int) -> Trial:
+    key = cell, seed
     if key not in _drawn:  # the last one alone is asked for again, by the next method
+        arm = load_arm(cell.arm, shapes="capsule")
         _drawn.clear()
-        _drawn[key] = draw_trial(load_arm(arm, shapes="capsule"), obstacles, speed, seed, resting)
+        _drawn[key] = draw_trial(arm, cell.obstacles, cell.speed, seed, cell.resting)
     return _drawn[key]
 
 
-_drawn: dict[tuple[str, int, float, int, bool], Trial] = {}
+_drawn: dict[tuple[Cell, int], Trial] = {}
 
 
 def _furniture(workspace: Workspace) -> Scene:

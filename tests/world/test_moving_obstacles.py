@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from densarm.arms.arm import Arm
-from densarm.errors import DensarmError
+from densarm.errors import DensarmError, InvalidValueError
 from densarm.scene.motion import BackAndForth, ConstantVelocity
 from densarm.scene.obstacles import Box, Capsule, HalfSpace, Obstacle, Sphere
 from densarm.scene.scene import Scene
@@ -178,3 +178,31 @@ def test_moves_that_are_refused(arm: Arm, arguments: dict[str, Any], message: st
     with pytest.raises(DensarmError, match=message):
         world.move_obstacle("it", **arguments)
     assert world.scene == Scene([BODIES[0]])
+
+
+def test_obstacles_that_are_not_seen_any_more_are_named(arm: Arm) -> None:
+    world = World(arm, Scene([Sphere(name=n, radius=0.1) for n in ("a", "b", "c")]))
+    assert world.unseen(5.0, 0.1) == ()
+    world.move_obstacle("a", [2.0, 0.0, 0.0], time=1.0)
+    world.move_obstacle("b", [0.0, 2.0, 0.0], time=1.05)
+    world.move_obstacle("c", [0.0, 0.0, 2.0])  # has no stream
+    assert world.unseen(1.08, 0.1) == ()
+    assert world.unseen(1.12, 0.1) == ("a",)
+    assert world.unseen(1.2, 0.1) == ("a", "b")
+    world.move_obstacle("a", [2.0, 0.0, 0.0], time=1.2)
+    assert world.unseen(1.2, 0.1) == ("b",)
+
+
+def test_obstacles_are_predicted_to_go_on_as_they_do(arm: Arm) -> None:
+    turns = ConstantVelocity(linear=[0.1, 0.0, 0.0], angular=[0.0, 0.0, 1.0])
+    bar = Box(name="bar", size=[0.4, 0.1, 0.1], position=[2.0, 0.0, 0.0], motion=turns)
+    still = Sphere(name="still", radius=0.1, position=[0.0, 3.0, 0.0])
+    world = World(arm, Scene([bar, still]))
+    world.set_time(0.5)
+    then, unmoved = world.predicted(0.3)
+    np.testing.assert_allclose(then.pose_at(0.0), bar.pose_at(0.8), atol=1e-12)
+    assert (then.motion, unmoved) == (None, still)
+    assert world.scene.obstacles[0] == bar
+    np.testing.assert_allclose(pin.XYZQUATToSE3(world.obstacle_pose("bar")), bar.pose_at(0.5))
+    with pytest.raises(InvalidValueError, match=r"^ahead = -0\.1"):
+        world.predicted(-0.1)
