@@ -178,7 +178,7 @@ def _held(phases: Sequence[Phase]) -> Check:
             (body, pose), (same, place) = was[name], now[name]
             if _shape(body) != _shape(same) or body.motion is not None:
                 fault = f"{name} is another body, or moves"
-            if not pose.isApprox(place, _SAME):
+            if not np.abs(pose.homogeneous - place.homogeneous).max() <= _SAME:
                 off = float(np.linalg.norm(pose.translation - place.translation))
                 fault = f"{name} is {1e3 * off:.3g} mm from where it was, or turned"
         if fault:

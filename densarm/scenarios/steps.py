@@ -6,7 +6,7 @@ from typing import Any
 
 from densarm.arms.arm import Arm
 from densarm.arms.description import RobotDescription
-from densarm.arms.joints import followed
+from densarm.arms.joints import followed, without_mimics
 from densarm.arms.line import Line
 from densarm.arms.models import frame_index
 from densarm.arms.pose import Pose
@@ -236,7 +236,7 @@ def gripper_positions(description: RobotDescription, grip: Grip) -> dict[str, fl
     Raises:
         UnknownNameError: a joint that is not locked.
     """
-    locked = description.locked_joints
+    locked = without_mimics(description).locked_joints
     for name in grip.joints:
         if name not in locked:
             raise UnknownNameError("joint of a gripper", name, locked)

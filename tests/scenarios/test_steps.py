@@ -1,5 +1,6 @@
 """Steps: from TOML, and every one that cannot be is refused in one line."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -9,7 +10,7 @@ from densarm.arms.catalogue import scenario_paths
 from densarm.errors import DensarmError, FileContentError, InvalidValueError
 from densarm.scenarios.run import plan
 from densarm.scenarios.scenario import load_scenario
-from densarm.scenarios.steps import Step, touching
+from densarm.scenarios.steps import Step, gripper_positions, touching
 from densarm.world.world import World
 
 SCENE = scenario_paths()["panda_pick_place"].read_text().split("# Can 1")[0]
@@ -100,6 +101,15 @@ def test_steps_are_in_place_of_a_goal_among_what_stands(tmp_path: Path) -> None:
         load(tmp_path, WAIT, scene=SCENE + "[control]\nform = 'regulation'\n")
     with pytest.raises(DensarmError, match="left out, where one motion to a goal is meant"):
         plan(load(tmp_path, WAIT))
+
+
+def test_joints_of_a_gripper_that_mimic_others_go_with_them(can_on_a_table: World) -> None:
+    fingers = ["panda_finger_joint1", "panda_finger_joint2"]
+    description = can_on_a_table.arm.description
+    for locked in ({fingers[0]: 0.04}, dict.fromkeys(fingers, 0.04)):
+        arm = replace(description, locked_joints=locked)
+        found = gripper_positions(arm, densarm.Grip({fingers[0]: 0.02}))
+        assert found == dict.fromkeys(fingers, 0.02)
 
 
 def test_a_floor_is_not_taken(can_on_a_table: World) -> None:
