@@ -3,6 +3,7 @@
 from .arms.arm import Arm as Arm
 from .arms.arm import load_arm as load_arm
 from .arms.free_body import free_body as free_body
+from .arms.line import Line as Line
 from .arms.pose import Pose as Pose
 from .certificates.certificate import Certificate as Certificate
 from .certificates.task import SimulationParameters as SimulationParameters
@@ -36,9 +37,15 @@ from .planning.motion import PlanningError as PlanningError
 from .planning.motion import TimingParameters as TimingParameters
 from .planning.plan import plan_motion as plan_motion
 from .planning.plan import plan_path as plan_path
+from .scenarios.perform import run_steps as run_steps
 from .scenarios.run import run as run
 from .scenarios.scenario import Scenario as Scenario
 from .scenarios.scenario import load_scenario as load_scenario
+from .scenarios.steps import Attach as Attach
+from .scenarios.steps import Detach as Detach
+from .scenarios.steps import Grip as Grip
+from .scenarios.steps import MoveTo as MoveTo
+from .scenarios.steps import Wait as Wait
 from .scene.loading import load_problems as load_problems
 from .scene.loading import load_scene as load_scene
 from .scene.mesh import Mesh as Mesh

@@ -20,7 +20,8 @@ from densarm.planning.path_guide import PathGuide
 from densarm.scenarios.control import ControlParameters
 from densarm.scenarios.run import run
 from densarm.scenarios.scenario import Scenario, load_scenario
-from densarm.scene.obstacles import Sphere
+from densarm.scenarios.steps import Step
+from densarm.scene.obstacles import Box, Cylinder, Sphere
 from densarm.scene.scene import Scene
 from densarm.simulation.run import Run
 from densarm.values.arrays import Array
@@ -62,6 +63,43 @@ def swing_up() -> Scenario:
 def swing_up_run(swing_up: Scenario) -> Run:
     """A certified run of swing_up."""
     return run(swing_up)
+
+
+TCP = "panda_hand_tcp"
+
+
+@pytest.fixture(scope="session")
+def can_on_a_table() -> World:
+    """Panda beside a table on which a can stands, its gripper open."""
+    table = Box(name="table", size=[0.8, 1.4, 0.04], position=[0.6, 0.0, 0.1])
+    can = Cylinder(name="can", radius=0.033, length=0.12, position=[0.5, -0.2, 0.18])
+    return World(densarm.load_arm("panda"), Scene([table, can]))
+
+
+@pytest.fixture(scope="session")
+def carrying_steps() -> tuple[Step, ...]:
+    """Take the can, lift it, and put it down elsewhere on the table."""
+    above = densarm.Pose(TCP, [0.5, -0.2, 0.315], [1.0, 0.0, 0.0, 0.0], "z")
+    beyond = densarm.Pose(TCP, [0.5, 0.1, 0.315], [1.0, 0.0, 0.0, 0.0], "z")
+    return (
+        densarm.MoveTo(above),
+        densarm.Line(TCP, along=[0.0, 0.0, 0.1]),
+        densarm.Grip({"panda_finger_joint1": 0.0336}),
+        densarm.Attach("can", "panda_hand", 0.3, "table"),
+        densarm.Line(TCP, by=[0.0, 0.0, 0.1]),
+        densarm.MoveTo(beyond),
+        densarm.Line(TCP, by=[0.0, 0.0, -0.1]),
+        densarm.Detach("can", "table"),
+        densarm.Grip({"panda_finger_joint1": 0.038}),
+        densarm.Wait(0.2),
+    )
+
+
+@pytest.fixture(scope="session")
+def carried_can(can_on_a_table: World, carrying_steps: tuple[Step, ...]) -> Run:
+    """A certified run of several phases."""
+    start = can_on_a_table.arm.postures["ready"]
+    return densarm.run_steps(can_on_a_table, start, carrying_steps)
 
 
 @pytest.fixture(scope="session")

@@ -274,3 +274,15 @@ def test_plan_only(
     )
     goal = densarm.load_scenario("ur5_bin").goal
     np.testing.assert_allclose(rows[-1, 1:7], goal, atol=0.01)
+
+
+@pytest.mark.slow
+def test_pick_and_place(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    run_example(monkeypatch, "pick_and_place.py")
+    *phases, run, remark = capsys.readouterr().out.splitlines()
+    assert len(phases) == 8
+    assert run.startswith("reached after ")
+    assert run.endswith("certified: True")
+    assert "passed over ways to goal 1: the line of 'panda_hand_tcp' along" in remark

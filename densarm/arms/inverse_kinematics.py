@@ -50,7 +50,7 @@ class InverseKinematics:
 
     def __init__(self, arm: Arm, pose: Pose) -> None:
         self._arm, self._pose = arm, pose
-        self._mechanism, self._target = _mechanism(arm, pose.frame), _target(arm, pose)
+        self._mechanism, self._target = mechanism_of(arm, pose.frame), _target(arm, pose)
 
     def solutions(self, near: Array, seed: int) -> Iterator[tuple[Array, ...]]:
         """Yield ways to reach the pose: each a configuration (nq,) and others in its place.
@@ -131,7 +131,13 @@ class Target(NamedTuple):
 _MADE: WeakKeyDictionary[Arm, dict[str, Mechanism]] = WeakKeyDictionary()
 
 
-def _mechanism(arm: Arm, frame: str) -> Mechanism:
+def mechanism_of(arm: Arm, frame: str) -> Mechanism:
+    """Return what carries a frame, kept as long as the arm is.
+
+    Raises:
+        UnknownNameError: no such frame.
+        InvalidValueError: a frame that no joint moves.
+    """
     made = _MADE.setdefault(arm, {})
     if frame not in made:
         made[frame] = _new_mechanism(arm, frame)

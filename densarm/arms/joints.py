@@ -127,6 +127,47 @@ def only_joints(
     return without_joints(description, {**others, **locked})
 
 
+def with_moving(
+    description: RobotDescription, joints: Collection[str], standing: Mapping[str, float]
+) -> RobotDescription:
+    """Return the description with locked joints that move, and others that stand instead.
+
+    What it gives per joint is left out. Joints that mimic others do not.
+
+    Args:
+        description: the arm.
+        joints: locked joints that move.
+        standing: positions of joints that stand [rad or m].
+    """
+    locked = {j: x for j, x in description.locked_joints.items() if j not in joints}
+    none: dict[str, Any] = dict.fromkeys(PER_JOINT)
+    return replace(description, locked_joints={**locked, **standing}, postures={}, **none)
+
+
+def without_mimics(description: RobotDescription) -> RobotDescription:
+    """Return the description with every locked joint told by itself, also those that mimic."""
+    urdf = Urdf(description)
+    root = parse_robot_xml(description.urdf, "URDF")
+    for joint in root.iter("joint"):
+        for mimic in joint.findall("mimic"):
+            joint.remove(mimic)
+    return replace(
+        description,
+        urdf=ElementTree.tostring(root, encoding="unicode"),
+        locked_joints=_locked_positions(urdf, description.locked_joints),
+    )
+
+
+def followed(description: RobotDescription, positions: Mapping[str, float]) -> dict[str, float]:
+    """Return positions of joints [rad or m] with those of the joints that mimic them."""
+    found, followers = dict(positions), _mimics(Urdf(description))
+    while ready := [j for j, mimic in followers.items() if j not in found and mimic[0] in found]:
+        for name in ready:
+            leader, multiplier, offset = followers[name]
+            found[name] = multiplier * found[leader] + offset
+    return found
+
+
 def without_subtrees(description: RobotDescription, joints: Iterable[str]) -> RobotDescription:
     """Return a robot without joints of any type, and without all that they carry, a gripper say.
 

@@ -106,8 +106,12 @@ def certify(
     return Certificate(tuple(checks))
 
 
-def swept_result(world: World, q: Array, v: Array, dt: float) -> SweptResult:
+def swept_result(
+    world: World, q: Array, v: Array, dt: float, kept: float | Array = 0.0
+) -> SweptResult:
     """Return the swept check of a motion recorded each dt [s], q (N, nq) and v (N, nv).
+
+    Pairs count as apart beyond a distance, each its own (K,), or one for all [m].
 
     Between samples the true motion departs from the chord by at most a Δt²/8, a the largest
     acceleration of the step and its neighbours. Obstacles with a motion are where it has them.
@@ -115,7 +119,7 @@ def swept_result(world: World, q: Array, v: Array, dt: float) -> SweptResult:
     acceleration = np.abs(np.diff(v, axis=0)) / dt
     k = np.arange(len(acceleration))
     around = np.max([acceleration[np.clip(k + by, 0, len(k) - 1)] for by in (-1, 0, 1)], axis=0)
-    return SweptCheck(world).check(
+    return SweptCheck(world, kept=kept).check(
         q, around * dt**2 / 8.0, dt * np.arange(len(q), dtype=np.float64)
     )
 
@@ -179,10 +183,14 @@ def _swept(task: Task, world: World, q: Array, v: Array) -> Check:
 
 def _start(task: Task, q: Array, v: Array, time: Array) -> Check:
     error = float(np.abs(task.arm.difference(task.start, q[0])).max())
-    speed = float(np.abs(v[0]).max())
+    begun = np.zeros(task.arm.nv) if task.start_velocity is None else task.start_velocity
+    speed = float(np.abs(v[0] - begun).max())
     shift = float(np.abs(time - task.simulation.dt * np.arange(len(time))).max())
     holds = error <= _ROUNDING and speed == 0.0 and shift <= _ROUNDING
-    detail = f"{error:.2g} from the start at {speed:.2g} rad/s, {shift:.2g} s off the time grid"
+    off = f"{shift:.2g} s off the time grid"
+    if begun.any():
+        off = f"at the speed of the phase before, {off}"
+    detail = f"{error:.2g} from the start at {speed:.2g} rad/s, {off}"
     return Check("start", holds, detail, _finite(_ROUNDING - max(error, speed, shift)), 0.0)
 
 

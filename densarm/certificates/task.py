@@ -18,7 +18,13 @@ from densarm.scene.mesh import Mesh
 from densarm.scene.obstacles import geometry_objects
 from densarm.scene.scene import Scene
 from densarm.values.arrays import Array
-from densarm.values.checks import non_negative, one_of, positive, positive_integer
+from densarm.values.checks import (
+    finite_vector,
+    non_negative,
+    one_of,
+    positive,
+    positive_integer,
+)
 from densarm.values.documented import documented
 from densarm.values.tables import parse_table
 
@@ -111,6 +117,8 @@ class Task:
     """Configuration at the start (nq,)."""
     goal: Array | None = None
     """Configuration to reach (nq,); None where a controller has none."""
+    start_velocity: Array | None = None
+    """Velocity at the start (nv,) [rad/s or m/s]; None for rest."""
     name: str = "run"
     title: str = "run"
     margin: float = 0.0
@@ -140,6 +148,9 @@ class Task:
             if getattr(self, key) is not None:
                 q = self.arm.check_configuration(f"{key} configuration", getattr(self, key))
                 object.__setattr__(self, key, q)
+        if self.start_velocity is not None:
+            v = finite_vector("start velocity", self.start_velocity, self.arm.nv)
+            object.__setattr__(self, "start_velocity", v)
 
     @property
     def large_meshes(self) -> dict[str, float]:
@@ -160,6 +171,7 @@ class Task:
     def to_json(self) -> dict[str, Any]:
         """Return JSON data that suffices to rebuild the task; `from_json` is its inverse."""
         goal = None if self.goal is None else self.arm.angles(self.goal).tolist()
+        begun = self.start_velocity
         control = dict(self.settings.get("control", {}))
         control |= {key: getattr(self, key) for key in ("margin", "kappa", "passive_speed")}
         return {
@@ -172,6 +184,7 @@ class Task:
             "obstacles": self.scene.to_json(),
             "start": self.arm.angles(self.start).tolist(),
             "goal": goal,
+            **({} if begun is None else {"start_velocity": begun.tolist()}),
             "input": str(self.input),
             "plant": self.plant,
             "disturbances": dict(self.disturbances),
@@ -197,6 +210,7 @@ class Task:
                 scene=Scene.from_json(data["obstacles"]),
                 start=arm.configuration(data["start"]),
                 goal=None if goal is None else arm.configuration(goal),
+                start_velocity=data.get("start_velocity"),
                 name=str(data["name"]),
                 title=str(data["title"]),
                 margin=float(control["margin"]),

@@ -110,6 +110,7 @@ def print_run(run: Run, compiled: float) -> None:
         "duration": f"{run.time[-1]:.3f} s",
         "min clearance": f"{smallest * 1e3:.4g} mm" if math.isfinite(smallest) else "no pairs",
         "goal error": "no goal" if run.task.goal is None else f"{run.goal_error:.2g} rad",
+        "phases": f"{len(run.phases)}, each with a goal of its own" if run.phases else "",
         "peak torque": (
             "none, velocities are commanded"
             if by_velocity
@@ -126,6 +127,8 @@ def print_run(run: Run, compiled: float) -> None:
         figures["plant"] = f"{run.task.plant}, {told or 'undisturbed'}"
     if run.tracking_error is not None:
         figures["tracking error"] = f"{run.tracking_error:.2g} rad"
+    if run.phases:
+        del figures["goal error"]
     print_figures(figures | doubts(run.task, run.base_overlaps))
     click.echo()
     print_certificate(run.certificate)

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from densarm.arms.arm import Arm
+from densarm.arms.line import Line, Segment
 from densarm.arms.pose import Pose
 from densarm.density.goal_distance import TorusDistance
 from densarm.density.navigation_density import DensityParameters
@@ -21,6 +22,7 @@ from densarm.planning.guide import Guide, NoPath, PlannedPath, PlanningParameter
 from densarm.planning.motion import Motion, PlanningError, TimingParameters
 from densarm.planning.path_guide import PathGuide
 from densarm.planning.shortening import shortened
+from densarm.planning.straight import straight_way
 from densarm.values.arrays import Array
 from densarm.values.checks import non_negative, non_negative_integer, one_of
 from densarm.values.outcome import Outcome
@@ -63,7 +65,7 @@ _STOP_SHARE = 0.5  # of the smooth path's that stopping keeps too; the rest is f
 def plan_motion(
     world: World,
     start: ArrayLike,
-    goal: Goal,
+    goal: Goal | Line,
     guide: str | Guide = "auto",
     *,
     margin: float = 0.0,
@@ -89,7 +91,8 @@ def plan_motion(
         start: configuration (nq,).
         goal: configuration (nq,), pose, or a list of these, of which any will do. The density leads
             to the `search.goals` nearest of them and of the poses' configurations, unless a
-            straight way would cost more than what was found; the least cost is what counts.
+            straight way would cost more than what was found; the least cost is what counts. Or a
+            `Line`, which a frame follows within 0.25 mm and 2.5 mrad, whatever the guide.
         guide: supplies the sub-goals: one of `GUIDES`, or a `Guide`.
         margin: safety margin m [m]; it must hold at start and goal too.
         seed: of the guide's random choices.
@@ -107,8 +110,11 @@ def plan_motion(
         PlanningError: there is no motion, with the outcome and the reason.
         InvalidValueError: no configuration, an unknown guide, or a value out of its range.
     """
-    legs = _legs(world, margin, density, alpha, kappa, sensing)
-    planned = _planned(legs, start, goal, guide, seed, path_margin, search)
+    legs, line = _legs(world, margin, density, alpha, kappa, sensing), None
+    if isinstance(goal, Line):
+        planned, line = _straight(legs.check, start, goal, path_margin)
+    else:
+        planned = _planned(legs, start, goal, guide, seed, path_margin, search)
     points, kept = planned.path.waypoints, planned.kept
     stuck, remark = "", planned.path.remark
     if not planned.path.is_clear:
@@ -120,7 +126,7 @@ def plan_motion(
         stuck, remark = legs.why_stuck(curve), curve.remark
     points, kept = np.vstack([start, points]), _SMOOTH_SHARE * kept
     motion = replace(
-        _timed(world, margin, kept, points, period, timing, time_limit),
+        _timed(world, margin, kept, points, period, timing, time_limit, line),
         margin=margin,
         path=planned.path,
         goal=planned.goal,
@@ -200,6 +206,18 @@ def _planned(
     chosen = found[: search.goals]
     planned = plan_to_any(chosen, guide, search, plan)
     return replace(planned, plan_time=time.perf_counter() - began)
+
+
+def _straight(
+    check: SweptCheck, start: ArrayLike, line: Line, path_margin: float
+) -> tuple[PlannedPath, Segment]:
+    began = time.perf_counter()
+    path, segment = straight_way(check, start, line)
+    points = path.waypoints
+    ends = np.min([check.distance_margin(q) for q in points[[0, -1]]], axis=0)
+    kept = np.minimum(path_margin, np.maximum(0.0, _END_SHARE * ends))
+    kept, cost = _kept_along(check, points, kept), way_cost(check.arm, points)
+    return PlannedPath(path, kept, time.perf_counter() - began, points[-1], cost), segment
 
 
 def _planned_to(
@@ -328,6 +346,7 @@ def _timed(
     period: float,
     timing: TimingParameters,
     time_limit: float,
+    line: Segment | None,
 ) -> Motion:
     """Return a smooth motion near a curve (N, nq) that keeps so much beyond the margin (K,) [m]."""
     arm = world.arm
@@ -339,9 +358,12 @@ def _timed(
     from densarm.planning.smoothing import smooth_path
     from densarm.planning.timing import time_path
 
-    path = smooth_path(world, margin, curve, kept)
+    path = smooth_path(world, margin, curve, kept, line)
     if path is None:
-        reason = "no smooth path near the planning system's curve is proved clear"
+        near = (
+            "the planning system's curve is proved clear" if line is None else "the line is clear"
+        )
+        reason = f"no smooth path near {near}"
         raise PlanningError(Outcome.NO_PATH, reason)
     stops = StoppingTrajectory(arm, timing.acceleration_share, timing.torque_share)
     stopping = StoppingCheck(world, stops, margin, _STOP_SHARE * kept)

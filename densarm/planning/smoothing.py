@@ -2,10 +2,14 @@
 
 import numpy as np
 
+from densarm.arms.line import Segment
 from densarm.values.arrays import Array
 from densarm.world.separating_planes import SeparatingPlanes, configuration_tube
 from densarm.world.swept_check import SweptCheck, SweptVerdict
 from densarm.world.world import World
+
+STRAIGHT = (2.5e-4, 2.5e-3)
+"""Largest distance and turn of a frame from the line that a plan leads it along [m, rad]."""
 
 _DEGREE = 3
 _WIDEST = 0.8  # [rad] between control points at first
@@ -59,7 +63,11 @@ class SmoothPath:
 
 
 def smooth_path(
-    world: World, margin: float, curve: Array, kept: float | Array = 0.0
+    world: World,
+    margin: float,
+    curve: Array,
+    kept: float | Array = 0.0,
+    line: Segment | None = None,
 ) -> SmoothPath | None:
     """Return a C² path with the ends of a polyline (N, nq), proved clear.
 
@@ -67,8 +75,8 @@ def smooth_path(
 
     Control points of a clamped uniform cubic B-spline are taken from the polyline at equal
     distances. Each piece of the spline stays in the convex hull of four of them, so that it tends
-    to the polyline as they get denser: their distance is halved until the path is proved clear.
-    None if even the densest gave no such path.
+    to the polyline as they get denser: their distance is halved until the path is proved clear,
+    and leads a frame along a line, if any, within `STRAIGHT`. None if even the densest gave none.
 
     Source: convex hull property: de Boor, A Practical Guide to Splines, ch. IX.
     """
@@ -83,9 +91,18 @@ def smooth_path(
         control = np.column_stack([np.interp(at, length, column) for column in corner.T])
         inner = np.linspace(0.0, 1.0, count - _DEGREE + 1)
         path = SmoothPath(np.pad(inner, _DEGREE, mode="edge"), control)
-        if _is_clear(proof, path, length[-1]):
+        if _is_straight(world, path, line) and _is_clear(proof, path, length[-1]):
             return path
     return None
+
+
+def _is_straight(world: World, path: SmoothPath, line: Segment | None) -> bool:
+    """Return whether the path leads a frame along a line, at ten samples for each control point."""
+    if line is None:
+        return True
+    s = np.linspace(0.0, 1.0, 10 * len(path.knots))
+    off = line.off(world.arm, world.arm.configurations(path(s)))
+    return all(bool((far <= most).all()) for far, most in zip(off, STRAIGHT, strict=True))
 
 
 def _is_clear(proof: "_MotionProof", path: SmoothPath, length: float) -> bool:

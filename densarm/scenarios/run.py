@@ -22,10 +22,12 @@ from densarm.control.replanning import PlanningInLoop, Replanning
 from densarm.control.tracking import DensityTracking
 from densarm.density.goal_distance import InertiaDistance, TorusDistance
 from densarm.density.navigation_density import density_towards
+from densarm.errors import InvalidValueError
 from densarm.planning.guide import Guide, GuidePath, PlannedPath
 from densarm.planning.motion import Motion, PlanningError
 from densarm.planning.plan import GUIDES, inside_limits, plan_motion, plan_path
 from densarm.scenarios.control import ControlForm
+from densarm.scenarios.perform import perform
 from densarm.scenarios.scenario import Scenario, load_scenario
 from densarm.simulation.disturbances import Disturbances
 from densarm.simulation.plants import Plant
@@ -96,6 +98,10 @@ def run(
     if disturbances is not None:
         chosen = replace(chosen, disturbances=disturbances)
     own = None if guide is None or isinstance(guide, str) else guide
+    if chosen.steps:
+        if own is not None or not (plant is None or isinstance(plant, str)):
+            raise InvalidValueError("guide or plant", own or plant, "one by name, of steps")
+        return perform(chosen, on_progress)
     other = None if isinstance(plant, str) else plant
     return run_by(chosen, lambda scenario: by_density(scenario, own), on_progress, other)
 
@@ -107,6 +113,7 @@ def run_by(
     plant: Plant | None = None,
 ) -> Run:
     """Run a scenario's closed loop by any way to drive the arm, or another plant, as `run`."""
+    scenario.require_one_goal()
     began = time.perf_counter()
     world, task = scenario.world, scenario.task
     on_progress("planning")
@@ -198,6 +205,7 @@ def plan(
     Raises:
         PlanningError: there is no motion, with the outcome and the reason.
     """
+    scenario.require_one_goal()
     return plan_motion(
         world or scenario.world,
         scenario.start if start is None else start,
@@ -210,19 +218,8 @@ def plan(
 
 def _asked(scenario: Scenario, guide: Guide | str | None) -> dict[str, Any]:
     """Return what a scenario asks of `plan_motion` and `plan_path`."""
-    control = scenario.control
-    return {
-        "goal": list(scenario.goals) or scenario.goal,
-        "guide": control.guide if guide is None else guide,
-        "margin": control.margin,
-        "seed": scenario.seed,
-        "path_margin": control.path_margin,
-        "alpha": control.planning_alpha,
-        "kappa": control.kappa,
-        "density": scenario.density,
-        "sensing": scenario.sensing,
-        "search": scenario.planning,
-    }
+    options = {"goal": list(scenario.goals) or scenario.goal, **scenario.plan_options}
+    return options if guide is None else {**options, "guide": guide}
 
 
 def _planned(
@@ -278,7 +275,8 @@ def records(run: Run) -> tuple[EnergyRecord, RantzerRecord]:
             among obstacles that move.
     """
     if run.task.goal is None:
-        return no_energy("no goal was given"), RantzerRecord(str(run.task.density.gauge))
+        reason = "steps have goals of their own" if run.phases else "no goal was given"
+        return no_energy(reason), RantzerRecord(str(run.task.density.gauge))
     scenario = Scenario.of_task(run.task)
     world, control = scenario.world, scenario.control
     if world.fastest_obstacle > 0.0:

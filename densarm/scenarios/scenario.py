@@ -6,12 +6,9 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from densarm.arms.arm import Arm, load_arm
 from densarm.arms.catalogue import scenario_paths
 from densarm.arms.description import own_frames
-from densarm.arms.joint_space import sliding_joints
 from densarm.arms.pose import Pose
 from densarm.certificates.task import PLANTS, Input, SimulationParameters, Task
 from densarm.control.controller import Gains
@@ -27,12 +24,18 @@ from densarm.planning.goals import candidates, goal_list
 from densarm.planning.guide import PlanningParameters
 from densarm.planning.motion import TimingParameters
 from densarm.scenarios.control import ControlForm, ControlParameters
+from densarm.scenarios.goal_values import (
+    goals_json,
+    read_configuration,
+    read_goal,
+    read_one_goal,
+)
+from densarm.scenarios.steps import Step, check_steps, parse_steps
 from densarm.scene.loading import parse_scene
 from densarm.scene.scene import Scene
 from densarm.simulation.disturbances import Disturbances
 from densarm.values.arrays import Array
 from densarm.values.checks import (
-    finite_vector,
     non_negative_integer,
     one_of,
 )
@@ -94,6 +97,8 @@ class Scenario:
     """Seed of every random choice."""
     goals: Sequence[Array | Pose] = ()
     """What `goal` was chosen from, of which any will do: a plan chooses again."""
+    steps: Sequence[Step] = ()
+    """What is done, one after another, in place of a motion to the goal; see `run_steps`."""
     goal_follows: str = ""
     """Name of the obstacle that the goal keeps to as that moves, a single pose in regulation; empty
     for one at rest."""
@@ -111,6 +116,12 @@ class Scenario:
             object.__setattr__(self, "goal", ranked[0].q)
         else:
             object.__setattr__(self, "goal", goals[0])
+        if self.steps:
+            object.__setattr__(self, "steps", tuple(self.steps))
+            check_steps(self.arm, self.scene, self.steps)
+            if self.control.form != ControlForm.TRACKING or self.control.passive_speed is not None:
+                allowed = "'tracking' without a passive speed, where there are steps"
+                raise InvalidValueError("control.form", str(self.control.form), allowed)
         if self.goal_follows:
             self._require_goal_that_follows()
         self.disturbances.require_fit(self.arm)
@@ -150,10 +161,36 @@ class Scenario:
         """Return K_p and K_v, as given or as a form of control has them by default."""
         return self.gains or (TRACKING_GAINS if form == ControlForm.TRACKING else Gains())
 
+    def require_one_goal(self) -> None:
+        """Refuse steps, where one motion to a goal is meant.
+
+        Raises:
+            InvalidValueError: it has steps.
+        """
+        if self.steps:
+            allowed = "left out, where one motion to a goal is meant (densarm run does steps)"
+            raise InvalidValueError("steps", len(self.steps), allowed)
+
     @property
     def law_gains(self) -> Gains:
         """K_p and K_v of the scenario's form of control."""
         return self.gains_of(self.control.form)
+
+    @property
+    def plan_options(self) -> dict[str, Any]:
+        """What it asks of `plan_motion` and `plan_path`, but for the goal."""
+        control = self.control
+        return {
+            "guide": control.guide,
+            "margin": control.margin,
+            "seed": self.seed,
+            "path_margin": control.path_margin,
+            "alpha": control.planning_alpha,
+            "kappa": control.kappa,
+            "density": self.density,
+            "sensing": self.sensing,
+            "search": self.planning,
+        }
 
     @property
     def goal_distance(self) -> TorusDistance:
@@ -172,7 +209,7 @@ class Scenario:
             disturbances=self.disturbances.given,
             settings={
                 "seed": self.seed,
-                **({"goals": _goals_json(self.arm, self.goals)} if self.goals else {}),
+                **({"goals": goals_json(self.arm, self.goals)} if self.goals else {}),
                 **({"goal_follows": self.goal_follows} if self.goal_follows else {}),
                 **{key: asdict(getattr(self, key)) for key in _SETTINGS},
                 "gains": asdict(self.law_gains),
@@ -198,7 +235,7 @@ class Scenario:
             **{key: getattr(task, key) for key in _SHARED},
             seed=settings.get("seed", 0),
             goal_follows=settings.get("goal_follows", ""),
-            goals=tuple(_one_goal(task.arm, "goals", item) for item in settings.get("goals", ())),
+            goals=tuple(read_one_goal(task.arm, "goals", x) for x in settings.get("goals", ())),
             disturbances=parse_table("disturbances", Disturbances, task.disturbances),
             **{
                 key: parse_table(key, TABLES[key], tables.get(key, {}))
@@ -225,7 +262,7 @@ TABLES: Mapping[str, type[Any]] = {
 _SETTINGS = ("control", "planning", "timing", "speed", "actuation")
 _OF_TASK = ("density", "sensing", "simulation", "plant")
 _SHARED = ("name", "title", "arm", "scene", "start", "goal", *_OF_TASK)
-_KEYS = {"title", "robot", "scene", "obstacles", "task", "plant", "seed", *TABLES}
+_KEYS = {"title", "robot", "scene", "obstacles", "task", "steps", "plant", "seed", *TABLES}
 
 
 def load_scenario(scenario: str | Path) -> Scenario:
@@ -260,14 +297,19 @@ def _parse(path: Path, data: dict[str, Any]) -> Scenario:
     task = parse_table("task", _TaskTable, data.get("task", {}))
     scene = parse_scene(path.parent, data.get("scene", ""), data.get("obstacles", []))
     arm = arm.holding(*scene.attachments)
+    start = read_configuration(arm, "task.start", task.start)
+    steps = parse_steps(arm, data["steps"]) if "steps" in data else ()
+    if steps and "goal" in data["task"]:
+        raise InvalidValueError("task.goal", task.goal, "left out where there are [[steps]]")
     return Scenario(
         name=path.stem,
         title=str(data.get("title", path.stem)),
         arm=arm,
         scene=Scene(scene),
-        start=_configuration(arm, "task.start", task.start),
-        goal=_goal(arm, "task.goal", task.goal),
+        start=start,
+        goal=start if steps else read_goal(arm, "task.goal", task.goal),
         goal_follows=task.goal_follows,
+        steps=steps,
         plant=data.get("plant", PLANTS[0]),
         seed=data.get("seed", 0),
         **{
@@ -325,48 +367,5 @@ def _parse_robot(folder: Path, table: _RobotTable) -> Arm:
 
 def with_goal(scenario: Scenario, key: str, value: Any) -> Scenario:
     """Return a scenario with a goal as files have it; errors call it by the key."""
-    return replace(scenario, goal=_goal(scenario.arm, key, value), goals=())
-
-
-def _goal(arm: Arm, key: str, value: Any) -> Any:
-    """Return the goal of a value of TOML or JSON: positions, a posture, a pose, or a list of them.
-
-    Raises:
-        DensarmError: as `Pose.of_table`, or a value that is none.
-    """
-    is_list = isinstance(value, list) and not all(isinstance(x, int | float) for x in value)
-    if not is_list:
-        return _one_goal(arm, key, value)
-    return [_one_goal(arm, f"{key}[{k}]", item) for k, item in enumerate(value)]
-
-
-def _one_goal(arm: Arm, key: str, value: Any) -> Array | Pose:
-    if isinstance(value, Mapping):
-        return Pose.of_table(key, value)
-    if not isinstance(value, str | list):
-        raise InvalidValueError(
-            key, value, "joint positions, a posture, a pose, or a list of these"
-        )
-    return _configuration(arm, key, value)
-
-
-def _goals_json(arm: Arm, goals: Sequence[Array | Pose]) -> list[Any]:
-    return [x.to_json() if isinstance(x, Pose) else arm.angles(x).tolist() for x in goals]
-
-
-def _configuration(arm: Arm, key: str, value: str | Sequence[float]) -> Array:
-    if isinstance(value, str):
-        if value not in arm.postures:
-            raise UnknownNameError(f"posture for {key}", value, arm.postures)
-        return arm.postures[value]
-    angles = finite_vector(f"{key} (one number per joint, or a posture)", value, arm.nv)
-    limits, turns = arm.limits, ~sliding_joints(arm.model)
-    outside = limits.excess(angles) > 0.0
-    for joint in np.flatnonzero(outside & turns & (np.abs(angles) > 2.0 * np.pi))[:1]:
-        low, high = limits.lower[joint], limits.upper[joint]
-        allowed = (
-            f"in radians, {low:.4g} to {high:.4g} for {arm.joint_names[joint]!r}, "
-            f"not {angles[joint]:g}: are these degrees?"
-        )
-        raise InvalidValueError(key, value, allowed)
-    return arm.configuration(angles)
+    scenario.require_one_goal()
+    return replace(scenario, goal=read_goal(scenario.arm, key, value), goals=())

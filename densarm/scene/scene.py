@@ -46,35 +46,42 @@ class Attachment:
     """Links that it may touch and even enter, besides its own."""
     mass: float = 0.0
     """Mass, spread evenly over its volume [kg]; 0 leaves it out of the dynamics."""
+    touch_obstacles: Sequence[str] = ()
+    """Obstacles that it may touch and even enter, as what it is lifted from."""
 
     def __post_init__(self) -> None:
         kinds = [kind for kind in OBSTACLE_TYPES.values() if kind is not HalfSpace]
         _require_kind("attached body", self.body, kinds)
-        name, links = self.body.name, self.touch_links
+        name = self.body.name
         if self.body.motion is not None:
             raise InvalidValueError(f"{name}.motion", self.body.motion, "none: its link moves it")
-        if not isinstance(links, tuple | list) or not all(isinstance(x, str) for x in links):
-            raise InvalidValueError(f"{name}.touch_links", links, "a list of names of links")
+        for key, kind in (("touch_links", "links"), ("touch_obstacles", "obstacles")):
+            names = getattr(self, key)
+            if not isinstance(names, tuple | list) or not all(isinstance(x, str) for x in names):
+                raise InvalidValueError(f"{name}.{key}", names, f"a list of names of {kind}")
+            object.__setattr__(self, key, tuple(names))
         if not isinstance(self.link, str):
             raise InvalidValueError(f"{name}.attached_to", self.link, "the name of a link")
-        object.__setattr__(self, "touch_links", tuple(links))
         object.__setattr__(self, "mass", non_negative(f"{name}.mass", self.mass))
 
     def to_json(self) -> dict[str, Any]:
         """Return the attachment as JSON data; `from_json` is its inverse."""
-        holding = {"attached_to": self.link, "touch_links": self.touch_links, "mass": self.mass}
+        holding = {"attached_to": self.link, **{key: getattr(self, key) for key in _HOLDING}}
         return {**obstacle_table(self.body), **holding}
 
     @classmethod
     def from_json(cls, table: Mapping[str, Any], folder: Path | None = None) -> "Attachment":
         """Build an attachment from what `parse_obstacle` takes, and ``attached_to``.
 
-        The table may have ``touch_links`` and ``mass`` too.
+        The table may have ``touch_links``, ``mass`` and ``touch_obstacles`` too.
         """
         values = dict(table)
         link = values.pop("attached_to", None)
-        touch_links, mass = values.pop("touch_links", ()), values.pop("mass", 0.0)
-        return cls(parse_obstacle(values, folder), link, touch_links, mass)
+        holding = {key: values.pop(key) for key in _HOLDING if key in values}
+        return cls(parse_obstacle(values, folder), link, **holding)
+
+
+_HOLDING = ("touch_links", "mass", "touch_obstacles")
 
 
 @documented

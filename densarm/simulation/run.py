@@ -2,6 +2,7 @@
 
 import json
 import zlib
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -11,6 +12,7 @@ from zipfile import BadZipFile, ZipFile, is_zipfile
 import numpy as np
 
 from densarm.certificates.certificate import Certificate, certify
+from densarm.certificates.phases import Phase, certify_phases, positions_of, values_of
 from densarm.certificates.task import Input, Task
 from densarm.errors import DensarmError, FileContentError
 from densarm.simulation.disturbances import Disturbances
@@ -72,6 +74,49 @@ class Run:
     tube: Array | None = None
     """Bounds ε on the error against it under which the plan is clear (nv,) [rad or m]; None without
     any."""
+    phases: tuple["Run", ...] = ()
+    """The runs of its steps, one after another, each in a world of its own, if it has steps. The
+    arrays are theirs, of all joints that any of them moves; those that one does not rest in it."""
+
+    @classmethod
+    def of_phases(cls, task: Task, phases: Sequence["Run"], **result: Any) -> "Run":
+        """Return the run of several, each of which begins where the last ended.
+
+        Args:
+            task: the arm with all joints that any of them moves, and the scene at first.
+            phases: the runs, at least one.
+            result: outcome, detail and remark.
+        """
+        names, parts = task.arm.joint_names, [slice(0, -1)] * (len(phases) - 1) + [slice(None)]
+
+        def rows(values: Callable[["Run"], Array]) -> Array:
+            # Of an end and the start of the next phase, which are one sample, the start is kept.
+            kept = [values(run)[part] for run, part in zip(phases, parts, strict=True)]
+            return np.concatenate(kept)
+
+        clearance = rows(lambda run: run.clearance)
+        errors = [run.tracking_error for run in phases if run.tracking_error is not None]
+        return cls(
+            task=task,
+            time=task.simulation.dt * np.arange(len(clearance), dtype=np.float64),
+            q=task.arm.configurations(rows(lambda run: positions_of(run.task.arm, run.q, names))),
+            v=rows(lambda run: values_of(run.task.arm, run.v, names)),
+            tau=rows(lambda run: values_of(run.task.arm, run.tau, names)),
+            clearance=clearance,
+            plan_time=sum(run.plan_time for run in phases),
+            preparation_time=sum(run.preparation_time for run in phases),
+            led_by="; ".join(dict.fromkeys(run.led_by for run in phases if run.led_by)),
+            tracking_error=max(errors, default=None),
+            phases=tuple(phases),
+            **result,
+        )
+
+    def located(self, rows: Iterable[int]) -> Iterator[tuple["Run", int]]:
+        """Yield the phase that has each sample, and its number there; without phases the run."""
+        starts = np.cumsum([0, *(len(run.time) - 1 for run in self.phases[:-1])])
+        for row in rows:
+            k = int(np.searchsorted(starts, row, side="right")) - 1
+            yield (self.phases[k], row - int(starts[k])) if self.phases else (self, row)
 
     @classmethod
     def at_rest(cls, task: Task, world: World, outcome: Outcome, detail: str) -> "Run":
@@ -99,6 +144,9 @@ class Run:
     @cached_property
     def certificate(self) -> Certificate:
         """What is proved about the run, computed anew from the record when first asked for."""
+        if self.phases:
+            runs = self.phases
+            return certify_phases([Phase(run.task, run.certificate, run.q, run.v) for run in runs])
         arrays = self.time, self.q, self.v, self.tau, self.reference, self.tube
         return certify(self.task, *arrays)
 
@@ -126,6 +174,10 @@ class Run:
         """Return the run's figures as JSON data; None for what is unknown or infinite."""
         smallest, error = float(self.clearance.min()), self.goal_error
         by_torque = self.task.input == Input.TORQUE
+        phases = [
+            {"title": x.task.title, "outcome": str(x.outcome), "duration_s": float(x.time[-1])}
+            for x in self.phases
+        ]
         return {
             "outcome": str(self.outcome),
             "duration_s": float(self.time[-1]),
@@ -139,6 +191,7 @@ class Run:
             "tube_rad": None if self.tube is None else self.tube.tolist(),
             "plant": self.task.plant,
             "disturbances": dict(self.task.disturbances),
+            **({"phases": phases} if phases else {}),
         }
 
     def save(self, path: str | Path) -> None:
@@ -150,6 +203,11 @@ class Run:
         Raises:
             FileContentError: the file cannot be written.
         """
+        with atomic_file(Path(path)) as file:
+            np.savez_compressed(file, **self._packed())
+
+    def _packed(self, prefix: str = "") -> dict[str, Any]:
+        """Return arrays by their names in a file, phases and all."""
         result = {
             "outcome": str(self.outcome),
             "detail": self.detail,
@@ -160,19 +218,14 @@ class Run:
             "tracking_error_rad": self.tracking_error,
             "replanned_at_s": list(self.replanned_at),
             "remark": self.remark,
+            "phases": len(self.phases),
         }
-        with atomic_file(Path(path)) as file:
-            np.savez_compressed(
-                file,
-                **{name: getattr(self, name) for name in _ARRAYS},
-                **{
-                    name: getattr(self, name)
-                    for name in _OPTIONAL
-                    if getattr(self, name) is not None
-                },
-                scenario=np.array(json.dumps(self.task.to_json())),
-                result=np.array(json.dumps(result)),
-            )
+        names = [*_ARRAYS, *(key for key in _OPTIONAL if getattr(self, key) is not None)]
+        packed = {f"{prefix}{name}": getattr(self, name) for name in names}
+        for k, run in enumerate(self.phases):
+            packed |= run._packed(f"{prefix}phase{k}.")
+        packed[f"{prefix}scenario"] = np.array(json.dumps(self.task.to_json()))
+        return {**packed, f"{prefix}result": np.array(json.dumps(result))}
 
     @classmethod
     def load(cls, path: str | Path) -> "Run":
@@ -185,24 +238,7 @@ class Run:
         try:
             _check_archive(path)
             with Path(path).open("rb") as file, np.load(file, allow_pickle=False) as data:
-                arrays = {name: data[name] for name in _ARRAYS}
-                arrays |= {name: data[name] for name in _OPTIONAL if name in data}
-                task = json.loads(str(data["scenario"]))
-                result = json.loads(str(data["result"]))
-            deviation = result["tracking_error_rad"]
-            return cls(
-                task=Task.from_json(task),
-                **arrays,
-                outcome=Outcome(result["outcome"]),
-                detail=str(result["detail"]),
-                plan_time=float(result["plan_time_s"]),
-                led_by=str(result.get("led_by", "")),
-                stuck=str(result.get("stuck", "")),
-                preparation_time=float(result["preparation_time_s"]),
-                tracking_error=None if deviation is None else float(deviation),
-                replanned_at=tuple(float(time) for time in result.get("replanned_at_s", ())),
-                remark=str(result.get("remark", "")),
-            )._checked()
+                return cls._unpacked(data)
         except OSError as error:
             raise FileContentError(path, error.strerror or "cannot be read") from None
         except FileContentError:
@@ -213,6 +249,35 @@ class Run:
             raise FileContentError(path, "not a run: too large, or nested too deeply") from None
         except (*_FAULTS, *_DAMAGE) as error:
             raise FileContentError(path, f"not a run: {' '.join(str(error).split())}") from None
+
+    @classmethod
+    def _unpacked(cls, data: Mapping[str, Any], prefix: str = "") -> "Run":
+        """Return the run of what `_packed` returned, or version 0.1 wrote."""
+        arrays = {name: data[f"{prefix}{name}"] for name in _ARRAYS}
+        arrays |= {name: data[at] for name in _OPTIONAL if (at := f"{prefix}{name}") in data}
+        task = Task.from_json(json.loads(str(data[f"{prefix}scenario"])))
+        result = json.loads(str(data[f"{prefix}result"]))
+        ended: dict[str, Any] = {
+            "outcome": Outcome(result["outcome"]),
+            "detail": str(result["detail"]),
+            "remark": str(result.get("remark", "")),
+        }
+        if count := int(result.get("phases", 0)):
+            # What the arrays of the whole say is not asked, since they are those of the phases.
+            phases = [cls._unpacked(data, f"{prefix}phase{k}.") for k in range(count)]
+            return cls.of_phases(task, phases, **ended)
+        deviation = result["tracking_error_rad"]
+        return cls(
+            task=task,
+            **arrays,
+            **ended,
+            plan_time=float(result["plan_time_s"]),
+            led_by=str(result.get("led_by", "")),
+            stuck=str(result.get("stuck", "")),
+            preparation_time=float(result["preparation_time_s"]),
+            tracking_error=None if deviation is None else float(deviation),
+            replanned_at=tuple(float(time) for time in result.get("replanned_at_s", ())),
+        )._checked()
 
     def _checked(self) -> "Run":
         n, arm = len(self.time), self.task.arm

@@ -184,6 +184,8 @@ class _Loop:
     def run(self, on_progress: OnProgress) -> Run:
         task, p = self.task, self.task.simulation
         q, v, inputs = task.start, np.zeros(task.arm.nv), []
+        if task.start_velocity is not None:
+            v = task.start_velocity.copy()
         wanted: list[Array | None] = []
         held, rest, rested_since = 0, q, 0
         motion = getattr(self.controller, "motion", None)

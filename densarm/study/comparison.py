@@ -201,12 +201,13 @@ def compare(
     Raises:
         UnknownNameError: a baseline that there is not.
         InvalidValueError: a number of starts or a budget below one, of tuning starts below zero, a
-            seed that is not a whole number, or a scenario that commands velocities.
+            seed that is not a whole number, or a scenario of steps or that commands velocities.
         DensarmError: no random start was found.
     """
     for name in baselines:
         if name not in BASELINES:
             raise UnknownNameError("method", name, BASELINES)
+    scenario.require_one_goal()
     if scenario.control.form == ControlForm.VELOCITY:
         raise InvalidValueError("control.form", "velocity", "one of torque, as all methods are")
     seed = scenario.seed if seed is None else seed

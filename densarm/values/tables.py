@@ -39,5 +39,7 @@ def parse_table(name: str, kind: type[T], data: Any) -> T:
         if isinstance(own, InvalidValueError):
             raise InvalidValueError(f"{name}.{own.name}", own.value, own.allowed) from None
         key = ".".join([name, *(str(part) for part in first["loc"][:1])])
+        if first["type"] == "missing":
+            raise InvalidValueError(key, None, "given") from None
         message = first["msg"].removeprefix("Input should be ").removeprefix("Value error, ")
         raise InvalidValueError(key, first["input"], message) from None

@@ -11,6 +11,7 @@ Color = tuple[float, ...]
 
 BOARD: Color = (0.85, 0.81, 0.78)
 OBSTACLE: Color = (0.83, 0.47, 0.30)
+CARRIED: Color = (0.36, 0.42, 0.58)
 EDGE: Color = (0.45, 0.22, 0.12)
 SENSING: Color = (0.93, 0.69, 0.13)
 GOAL: Color = (0.16, 0.62, 0.43)

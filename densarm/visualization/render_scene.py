@@ -8,6 +8,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
+from densarm.certificates.phases import body_poses
 from densarm.scene.obstacles import numbered
 from densarm.scene.scene import Scene
 from densarm.simulation.run import Run
@@ -15,11 +16,12 @@ from densarm.values.arrays import Array
 from densarm.values.outcome import Outcome
 from densarm.visualization.bodies import Body, arm_bodies, obstacle_bodies
 from densarm.visualization.camera import Camera
-from densarm.visualization.palette import ClearanceScale
+from densarm.visualization.palette import CARRIED, ClearanceScale
 from densarm.visualization.triangle_mesh import TriangleMesh, sphere_swept_hull, tube
 from densarm.world.world import NearestPair, World
 
 _FRAMES_PER_SECOND = 60.0
+_SAME = 1e-9  # [m], and of rotations
 _FLOOR_CELL = 0.25  # [m]
 _PATH_RADIUS = 0.006  # of the drawn end-effector path, as a part of the arm's extent
 _CLOSEST_RADIUS = 0.5  # of the closest pair's line, as a part of the path's
@@ -87,12 +89,22 @@ class RenderScene:
         self._data = self._model.createData()
         rows = _key_rows(run)
         self.time, self.q = run.time[rows] - run.time[0], run.q[rows]
-        origin, world = task.arm.origin, World(task.arm, task.scene)
-        nearest = [_nearest_at(world, *row) for row in zip(self.q, run.time[rows], strict=True)]
+        origin = task.arm.origin
+        nearest = _nearest(run, rows)
         self.closest = [replace(pair, points=pair.points - origin) for pair in nearest if pair]
         self.robot = arm_bodies(task.arm)
         self.obstacles = obstacle_bodies(task.scene, origin)
-        self.obstacle_poses = _poses_in_motion(task.scene, self.obstacles, run.time[rows], origin)
+        self.obstacle_poses = (
+            _poses_in_phases(run, rows, self.obstacles)
+            if run.phases
+            else _poses_in_motion(task.scene, self.obstacles, run.time[rows], origin)
+        )
+        if run.phases:
+            carried = self.obstacle_poses
+            self.obstacles = tuple(
+                replace(body, color=CARRIED) if body.name in carried else body
+                for body in self.obstacles
+            )
         self._solid = [body for body in self.obstacles if body.has_end]
         self.sensing_distance = task.margin + task.sensing.distance
         self.clearance = np.array([pair.distance for pair in self.closest])
@@ -147,9 +159,33 @@ class RenderScene:
         return np.vstack([points, np.clip(corners, low - margin, high + margin)])
 
 
-def _nearest_at(world: World, q: Array, time: float) -> NearestPair | None:
-    world.set_time(time)
-    return world.nearest(q)
+def _nearest(run: Run, rows: NDArray[np.int64]) -> list[NearestPair | None]:
+    """Return the nearest pair at samples of a run, each in the world of its phase."""
+    parts = run.phases or (run,)
+    worlds = {id(part): World(part.task.arm, part.task.scene) for part in parts}
+    found = []
+    for part, row in run.located(rows.tolist()):
+        world = worlds[id(part)]
+        world.set_time(float(part.time[row]))
+        found.append(world.nearest(part.q[row]))
+    return found
+
+
+def _poses_in_phases(
+    run: Run, rows: NDArray[np.int64], bodies: Sequence[Body]
+) -> dict[str, list[pin.SE3]]:
+    """Return the poses of the bodies that phases move, at samples."""
+    origin = pin.SE3(np.eye(3), -run.task.arm.origin)
+    now = [body_poses(part.task, part.q[row]) for part, row in run.located(rows.tolist())]
+    placed, found = {body.name: body.placement for body in bodies}, {}
+    for obstacle in run.task.scene:
+        poses = [origin * poses[obstacle.name][1] for poses in now]
+        if all(pose.isApprox(poses[0], _SAME) for pose in poses):
+            continue
+        begin = (origin * obstacle.pose_at(0.0)).inverse()
+        for name in numbered(obstacle.name, len(obstacle.convex_shapes())):
+            found[name] = [pose * begin * placed[name] for pose in poses]
+    return found
 
 
 def _poses_in_motion(

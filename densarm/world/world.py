@@ -14,7 +14,7 @@ from densarm.arms.dynamics import holding_ratios, holding_torque
 from densarm.arms.inverse_kinematics import InverseKinematics
 from densarm.arms.pose import Pose
 from densarm.errors import DensarmError, InvalidValueError
-from densarm.scene.obstacles import Obstacle, geometry_objects
+from densarm.scene.obstacles import Obstacle, geometry_objects, numbered
 from densarm.scene.scene import Scene
 from densarm.values.arrays import Array
 from densarm.values.checks import non_negative, non_negative_integer, positive_integer
@@ -328,11 +328,20 @@ def _geometry_model(arm: Arm, scene: Scene) -> pin.GeometryModel:
         for k, item in enumerate(model.geometryObjects)
         if item.parentJoint > 0 and item.name not in arm.self_pieces
     ]
-    for item in [x for obstacle in scene for x in geometry_objects(obstacle, origin=arm.origin)]:
-        if model.existGeometryName(item.name):
-            allowed = f"other than the names of the shapes of {arm.name!r}"
-            raise InvalidValueError("obstacle name", item.name, allowed)
-        index = model.addGeometryObject(item)
-        for k in moving:
-            model.addCollisionPair(pin.CollisionPair(int(k), int(index)))
+    names, held = [item.name for item in model.geometryObjects], arm.description.attachments
+    touching = {
+        (name, obstacle)
+        for each in held
+        for name in numbered(each.body.name, len(each.body.convex_shapes()))
+        for obstacle in each.touch_obstacles
+    }
+    for obstacle in scene:
+        for item in geometry_objects(obstacle, origin=arm.origin):
+            if model.existGeometryName(item.name):
+                allowed = f"other than the names of the shapes of {arm.name!r}"
+                raise InvalidValueError("obstacle name", item.name, allowed)
+            index = model.addGeometryObject(item)
+            for k in moving:
+                if (names[k], obstacle.name) not in touching:
+                    model.addCollisionPair(pin.CollisionPair(int(k), int(index)))
     return model

@@ -7,6 +7,7 @@ import pytest
 from click.testing import CliRunner
 
 from densarm.arms.catalogue import scenario_paths
+from densarm.certificates.phases import body_poses
 from densarm.cli.list_known import list_known
 from densarm.scenarios.control import ControlForm
 from densarm.scenarios.run import run
@@ -58,7 +59,7 @@ def test_start_and_goal_are_clear_and_the_straight_segment_is_not(scenario: Scen
         angles = arm.angles(q)
         assert ((angles >= arm.limits.lower) & (angles <= arm.limits.upper)).all()
     is_straight = check.segment_is_clear(scenario.start, scenario.goal)
-    assert scenario.world.fastest_obstacle > 0.0 or not is_straight
+    assert scenario.world.fastest_obstacle > 0.0 or scenario.steps or not is_straight
 
 
 def test_it_is_listed_with_its_robot_joints_and_pairs(scenario: Scenario) -> None:
@@ -78,10 +79,11 @@ def test_a_real_arm_would_accept_its_torques(name: str) -> None:
     if loaded(name).world.fastest_obstacle > 0.0:
         pytest.skip("evades what moves")
     done = ran(name)
-    arm = done.task.arm
-    held = np.array([arm.nonlinear_effects(q, np.zeros(arm.nv)) for q in done.q])
-    free = np.vstack([np.zeros(arm.nv), done.tau - held])
-    assert np.abs(np.diff(free, axis=0)).max() <= 1e3 * done.task.simulation.dt + 1e-6
+    for part in done.phases or (done,):
+        arm = part.task.arm
+        held = np.array([arm.nonlinear_effects(q, np.zeros(arm.nv)) for q in part.q])
+        free = np.vstack([np.zeros(arm.nv), part.tau - held])
+        assert np.abs(np.diff(free, axis=0)).max() <= 1e3 * done.task.simulation.dt + 1e-6
 
 
 def test_kinova_goes_the_short_way_round() -> None:
@@ -96,3 +98,27 @@ def test_kinova_goes_the_short_way_round() -> None:
 def test_a_part_is_carried_out_of_a_bin() -> None:
     done = ran("ur5_bin")
     assert (done.outcome, done.certified) == (Outcome.REACHED, True), done.detail
+
+
+@pytest.mark.parametrize(
+    ("name", "into", "half", "bodies"),
+    [
+        ("panda_pick_place", "bottom", (0.2, 0.05, 0.07), ("can_1", "can_2", "can_3")),
+        ("ur5_bin_pick", "tray_bottom", (0.15, 0.1, 0.03), ("part_1", "part_2")),
+    ],
+)
+def test_what_is_picked_is_put_where_it_belongs(
+    name: str, into: str, half: tuple[float, ...], bodies: tuple[str, ...]
+) -> None:
+    done = ran(name)
+    assert (done.outcome, done.certified) == (Outcome.REACHED, True), done.detail
+    last = done.phases[-1]
+    where = {key: pose for key, (_, pose) in body_poses(last.task, last.q[-1]).items()}
+    for body in bodies:
+        assert (np.abs(where[into].actInv(where[body].translation)) <= half).all()
+
+
+def test_the_second_grasp_in_the_corner_of_a_bin() -> None:
+    remark = ran("ur5_bin_pick").remark
+    assert "passed over ways to goal 1: the line of 'cup' by (0, 0, -0.2) m is blocked" in remark
+    assert "wrist_3_link_0 and bin_right overlap by" in remark

@@ -161,3 +161,16 @@ def test_failed_run(resting: Run, clearance: float, expected: str) -> None:
     assert summary.words[0] == ("no path", False)
     assert summary.words[1:3] == (("0.000 s", None), (f"smallest clearance {expected}", None))
     assert summary.detail == f"{Outcome.NO_PATH.description} late"
+
+
+@pytest.mark.slow
+def test_what_phases_carry_is_drawn_where_it_is(carried_can: Run) -> None:
+    scene = RenderScene(carried_can)
+    assert {body.name for body in scene.obstacles} == {"table", "can"}
+    assert scene.obstacle_poses.keys() == {"can"}
+    heights = np.array([pose.translation[2] for pose in scene.obstacle_poses["can"]])
+    assert heights[[0, -1]] == pytest.approx([0.18, 0.18], abs=1e-3)
+    assert heights.max() == pytest.approx(0.28, abs=1e-3)
+    fingers = scene.q[:, 7:]
+    assert np.ptp(fingers[:, 0]) == pytest.approx(0.0064, abs=1e-4)
+    assert scene.clearance.min() == pytest.approx(carried_can.clearance.min())

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from densarm.arms.arm import Arm, load_arm
 from densarm.errors import InvalidValueError
 from densarm.scene.obstacles import Box, Capsule, Cylinder, HalfSpace, Obstacle, Sphere
-from densarm.scene.scene import Scene
+from densarm.scene.scene import Attachment, Scene
 from densarm.values.arrays import Array
 from densarm.world.distance_view import DistanceView
 from densarm.world.world import World
@@ -378,3 +378,15 @@ def test_obstacles_in_the_base_are_told_as_they_come_and_go(
     for name in ("table", "globe"):
         world.remove_obstacle(name)
     assert world.base_overlaps() == ()
+
+
+def test_what_a_held_body_may_touch_is_no_pair() -> None:
+    arm = load_arm("two_link")
+    ball = Sphere(name="ball", radius=0.05)
+    scene = Scene([Box(name=name, size=[1.0, 1.0, 0.1]) for name in ("table", "shelf")])
+    held = Attachment(ball, arm.end_effector, touch_obstacles=["table"])
+    pairs = World(arm.holding(held), scene).pairs
+    assert ("ball", "table") not in pairs
+    assert ("ball", "shelf") in pairs
+    assert ("lower_link_0", "table") in pairs
+    assert Attachment.from_json(held.to_json()) == held
