@@ -138,6 +138,9 @@ class Task:
                 q = self.arm.check_configuration(f"{key} configuration", getattr(self, key))
                 object.__setattr__(self, key, q)
 
+    def __repr__(self) -> str:
+        return f"Task({self.title!r}, {self.arm}, {self.scene})"
+
     @property
     def large_meshes(self) -> dict[str, float]:
         """Longest side [m] of each mesh above 10 m, link or obstacle: perhaps its unit is wrong."""

@@ -176,6 +176,9 @@ class Scenario:
         may_blend = form in {ControlForm.REGULATION, ControlForm.PLAIN}
         require_smooth_goal(self.density, may_blend=may_blend, form=str(form))
 
+    def __repr__(self) -> str:
+        return f"Scenario({self.name!r}, {self.arm}, {self.scene})"
+
     @cached_property
     def world(self) -> World:
         """The arm among the obstacles, made when first asked for."""

@@ -19,6 +19,7 @@ from densarm.simulation.run import Run
 from densarm.values.files import atomic_file
 from densarm.visualization import palette
 from densarm.visualization.meshcat_drawing import draw
+from densarm.visualization.notebook import is_in_notebook, show_page
 from densarm.visualization.palette import css
 from densarm.visualization.render_scene import RenderScene, SummaryLine
 
@@ -30,6 +31,8 @@ _CHIPS = {True: "good", False: "bad", None: ""}  # classes of the page's style s
 def view(run: Run, on_url: Callable[[str], object] = print, *, open_browser: bool = True) -> None:
     """Show a run in the browser, with play, pause and a time line, until Ctrl-C.
 
+    In a notebook it is shown below the cell, which is done at once.
+
     Args:
         run: what to show.
         on_url: told the page's address.
@@ -38,7 +41,11 @@ def view(run: Run, on_url: Callable[[str], object] = print, *, open_browser: boo
     Raises:
         KeyboardInterrupt: on Ctrl-C.
     """
-    with PageServer(html_page(run)) as server:
+    page = html_page(run)
+    if is_in_notebook():
+        show_page(page)
+        return
+    with PageServer(page) as server:
         on_url(server.url)
         if open_browser:
             webbrowser.open(server.url)

@@ -52,9 +52,14 @@ def save_picture(run: Run, path: str | Path) -> None:
         FileContentError: the file cannot be written.
     """
     with _picture_file(path, ".png") as file:
-        scene = RenderScene(run)
-        k = int(np.argmin(scene.clearance)) if scene.closest else len(scene.time) // 2
-        Picture(scene, *_STILL_SIZE).frame(k).save(file, format="PNG")
+        still(run, *_STILL_SIZE).save(file, format="PNG")
+
+
+def still(run: Run, width: int, height: int) -> Image.Image:
+    """Return a picture of a width and height [pixels] of a run where it is closest to collision."""
+    scene = RenderScene(run)
+    k = int(np.argmin(scene.clearance)) if scene.closest else len(scene.time) // 2
+    return Picture(scene, width, height).frame(k)
 
 
 def save_animation(run: Run, path: str | Path) -> None:
