@@ -43,5 +43,5 @@ def is_in_notebook() -> bool:
 def show_page(page: str) -> None:
     """Show a page of HTML below the cell that runs."""
     display: Any = sys.modules["IPython"].display
-    frame = f'<iframe srcdoc="{html.escape(page)}" width="100%" height="{_HEIGHT}" '
-    display.display(display.HTML(frame + 'style="border: 0"></iframe>'))
+    frame = f'<iframe srcdoc="{html.escape(page)}" width="100%" height="{_HEIGHT}"'
+    display.display(display.HTML(f'<div>{frame} style="border: 0"></iframe></div>'))
