@@ -18,6 +18,7 @@ import umsgpack
 from densarm.simulation.run import Run
 from densarm.values.files import atomic_file
 from densarm.visualization import palette
+from densarm.visualization.bodies import spoken_names
 from densarm.visualization.meshcat_drawing import draw
 from densarm.visualization.notebook import is_in_notebook, show_page
 from densarm.visualization.palette import css
@@ -98,10 +99,12 @@ def html_page(run: Run) -> str:
 
 
 def _closest(scene: RenderScene) -> dict[str, Any]:
+    found = {name for pair in scene.closest for name in pair.names}
+    spoken = spoken_names(scene.run.task.arm, found)
     return {
         "time": scene.time.round(_DECIMALS).tolist(),
         "distance": scene.clearance.round(_DECIMALS).tolist(),
-        "names": [pair.names for pair in scene.closest],
+        "names": [[spoken[name] for name in pair.names] for pair in scene.closest],
         "matrices": {  # column by column, as three.js has them
             name: transforms.transpose(0, 2, 1).reshape(-1, 16).round(_DECIMALS).tolist()
             for name, (_, transforms) in scene.closest_line.items()
