@@ -24,8 +24,8 @@ from numpy.typing import ArrayLike
 import densarm
 from densarm import Arm, Controller
 from densarm.density.sub_goals import SubGoals
+from densarm.scenarios.control import ControlForm
 from densarm.scenarios.run import by_density
-from densarm.scenarios.scenario import ControlForm
 from densarm.values.arrays import Array
 from densarm.world.active_pairs import ExactDistances
 from densarm.world.stopping import StoppingCheck, StoppingTrajectory

@@ -31,8 +31,9 @@ import densarm
 from densarm import Run
 from densarm.arms.catalogue import scenario_paths
 from densarm.arms.dynamics import JointTorques
+from densarm.scenarios.control import ControlForm
 from densarm.scenarios.run import by_density
-from densarm.scenarios.scenario import ControlForm, Scenario
+from densarm.scenarios.scenario import Scenario
 from densarm.values.arrays import Array
 
 COUNTED = 0.01  # share of the acceleration limit that a sign must have

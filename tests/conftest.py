@@ -17,8 +17,9 @@ from densarm.density.sub_goals import GuidedDensity, GuidePath, SubGoals
 from densarm.density.unsafe_sets import SensingParameters
 from densarm.planning.guide import NoPath
 from densarm.planning.path_guide import PathGuide
+from densarm.scenarios.control import ControlParameters
 from densarm.scenarios.run import run
-from densarm.scenarios.scenario import ControlParameters, Scenario, load_scenario
+from densarm.scenarios.scenario import Scenario, load_scenario
 from densarm.scene.obstacles import Sphere
 from densarm.scene.scene import Scene
 from densarm.simulation.run import Run

@@ -77,6 +77,15 @@ def test_own_control_loop(
 
 
 @pytest.mark.slow
+def test_plan_beside(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    run_example(monkeypatch, "plan_beside.py")
+    planned, result = capsys.readouterr().out.splitlines()
+    assert planned.startswith("planned again at t = ")
+    assert float(planned.split()[-2]) > 0.0  # [mm] of clearance
+    assert float(result.split()[0]) < 0.01  # [rad] from the goal
+
+
+@pytest.mark.slow
 def test_free_body(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -18,7 +18,7 @@ from densarm.scene.mesh import Mesh
 from densarm.scene.obstacles import geometry_objects
 from densarm.scene.scene import Scene
 from densarm.values.arrays import Array
-from densarm.values.checks import one_of, positive, positive_integer
+from densarm.values.checks import non_negative, one_of, positive, positive_integer
 from densarm.values.documented import documented
 from densarm.values.tables import parse_table
 
@@ -76,10 +76,13 @@ class SimulationParameters:
     """Time that the goal must be held [s]."""
     stall_time: float = 1.0
     """Time within which an arm away from the goal moves by 0.01 rad, or counts as stuck [s]."""
+    planning_time: float = 0.3
+    """Simulated time that planning again takes, while the loop goes on [s]."""
 
     def __post_init__(self) -> None:
         for name in ("dt", "time_limit", "hold_time", "stall_time"):
             positive(name, getattr(self, name))
+        non_negative("planning_time", self.planning_time)
         positive_integer("control_divisor", self.control_divisor)
         integrator = Integrator(one_of("integrator", self.integrator, list(Integrator)))
         object.__setattr__(self, "integrator", integrator)

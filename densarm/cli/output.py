@@ -117,7 +117,7 @@ def print_run(run: Run, compiled: float) -> None:
         ),
         "planning": f"{run.plan_time:.3f} s, ready after {run.preparation_time:.2f} s",
         "led by": run.led_by + (f"; alone it is stuck: {run.stuck}" if run.stuck else ""),
-        "density": run.remark,
+        "remark": run.remark,
         "compiled": f"{compiled:.1f} s, once on this machine" if compiled > 0.0 else "",
         "planned again": ", ".join(f"at t = {time:.3f} s" for time in run.replanned_at),
     }

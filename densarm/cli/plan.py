@@ -99,7 +99,7 @@ def plan(
             "duration": f"{motion.duration:.3f} s, {len(samples.time)} samples",
             "planning": f"{motion.plan_time:.3f} s",
             "led by": motion.path.found_by if motion.path else "",
-            "density": motion.remark,
+            "remark": motion.remark,
             "compiled": once,
             "may be off by": tubes or "nothing, as far as is proved",
             **doubts(chosen.task, chosen.world.base_overlaps()),

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 from densarm.control.controller import Gains, ToldByGoal, checked_state
 from densarm.control.inverse_dynamics import InverseDynamics
 from densarm.control.stopping import StopAndHold
-from densarm.control.tracking import WANTED_RATE, DensityTracking
+from densarm.control.tracking import DensityTracking
 from densarm.planning.motion import Motion
 from densarm.scene.scene import Scene
 from densarm.values.arrays import Array
@@ -22,9 +22,6 @@ from densarm.world.world import DISTANCE_TOLERANCE, World
 # Of a straight stop, and of one by the reference's clock: T as the torque of the former has it, how
 # much later it ends, and how long the arm may go on at its velocity beside T / 2 [s].
 _BRAKE, _PAUSE = (1.0, 0.05, 0.02), (1.5, 0.25, 0.08)
-_CLOCK_SHARE = 0.6  # of the acceleration limits, in which the clock slows down and speeds up
-_CLOCK_LATE, _RATE_SOON = (0.0, 0.05, 0.1, 0.15), 0.3  # [s] that its rate lags, and by how much
-_STEEPEST = 10.0  # [1/s], its rate's slope where the motion is slow
 _ROOM = 1.1  # times what a pause needs, before the arm goes on
 _LOOK_AHEAD, _INTERVAL = 0.2, 0.01  # [s] of the motion, before the arm goes on; between samples
 _SLOW = 0.005  # [rad/s or m/s], at which nothing is braked any more; half of what counts as rest
@@ -73,7 +70,7 @@ class PassiveTracking(ToldByGoal):
         self.motion = motion
         scene = world.scene
         standing = Scene([item for item in scene if item.motion is None], scene.attachments)
-        self._tracking = _RampedTracking(World(world.arm, standing), motion, **options)
+        self._tracking = DensityTracking(World(world.arm, standing), motion, **options)
         self.goal = self._tracking.goal
         self._arm, self._world, self._near = world.arm, world, NearPairs(world)
         self._way, self._changes = world.obstacle_way.copy(), world.changes.copy()
@@ -167,7 +164,8 @@ class PassiveTracking(ToldByGoal):
         if off <= _RETURNED:
             if np.abs(v).max() <= _SLOW:
                 self._tracking.dynamics.take_over(self._brake.dynamics, last)
-                self._tracking.go_on_near(q)
+                self._tracking.resume(q)
+                self._tracking.pause()
                 self._stands = False
             return
         if not is_clear:
@@ -197,28 +195,3 @@ class PassiveTracking(ToldByGoal):
         far = self.motion.margin + self.passive_speed * (longer * stop + late)
         far += DISTANCE_TOLERANCE
         return np.asarray(ways @ self._world.lipschitz.T + far[:, np.newaxis])
-
-
-class _RampedTracking(DensityTracking):
-    """Tracks a motion, the clock of which speeds up and slows down within the accelerations."""
-
-    def lead_clock(self, to: float) -> None:
-        """Take the rate that the reference's clock is to have a period nearer to another one."""
-        rate = float(self._numbers[WANTED_RATE])
-        if rate == to:
-            return
-        sign, most, slope = math.copysign(1.0, to - rate), self._arm.limits.acceleration, _STEEPEST
-        later = min(rate + _RATE_SOON, 1.0) if to > rate else rate
-        for ahead in _CLOCK_LATE:
-            sample = self.motion.sample(self.reference_time + ahead * later)
-            own = sign * later**2 * np.sign(sample.velocity) * sample.acceleration
-            left = np.minimum(_CLOCK_SHARE * most, HELD_SHARE * most - own)
-            slope = min(slope, float((left / np.maximum(np.abs(sample.velocity), 1e-9)).min()))
-        slope = max(slope, 0.0)
-        step = min(self.motion.period * slope, abs(to - rate))
-        self._numbers[WANTED_RATE] = to if step == abs(to - rate) else rate + sign * step
-
-    def go_on_near(self, q: Array) -> None:
-        """Go on from rest at q (nq,), from the nearest place on the motion."""
-        self.resume(q)
-        self._numbers[WANTED_RATE] = 0.0

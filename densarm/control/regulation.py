@@ -19,6 +19,7 @@ from densarm.control.inverse_dynamics import (
     TORQUE,
     InverseDynamics,
 )
+from densarm.control.moving_goal import MovingGoal
 from densarm.control.sensing import require_smooth_goal
 from densarm.control.speed_law import SpeedLaw, SpeedParameters
 from densarm.control.stopping import BackupFilter
@@ -39,7 +40,6 @@ from densarm.world.world import World
 
 _LEAVING_SPEED = 0.1  # [rad/s] at a critical point of ρ that is no maximum
 _NEAR = 1e-3  # [rad], below which a sub-goal's pull fades
-_GOES_ON = 0.1  # [s] for which a goal that moves goes on without being set again
 
 
 class VelocityField(Protocol):
@@ -262,8 +262,7 @@ class DensityRegulation(FieldRegulation):
         goals, led_by = SubGoals(self._check, path, sensing), self._distance_to(self.goal)
         self._guided = GuidedDensity(self._check, goals, led_by, density, tuple(unsafe_sets))
         self._density_field = _DensityField(self._guided, gains.rate)
-        self._given_goal, self._given_velocity, self._given_time = self.goal, np.zeros(0), math.nan
-        self._moves = False
+        self._moving_goal, self._goal_moves = MovingGoal(arm, self.goal), np.zeros(0)
         inertia_at = path.waypoints[-1] if plain else None
         law = SpeedLaw(world, margin, speed)
         gives_way = None
@@ -284,7 +283,8 @@ class DensityRegulation(FieldRegulation):
             goal: configuration (nq,), or pose, that it has at the next call.
             velocity: at which it goes on from there (nv,) [rad/s or m/s], or of a pose (6,), linear
                 [m/s] and angular [rad/s], both in the world; for 0.1 s, after which it rests unless
-                it was set again; None for a goal at rest.
+                it was set again. None to estimate it from the goal that was set before, as
+                `MovingGoal` does.
 
         Raises:
             InvalidValueError: as for the class, or a velocity of another length or not finite; the
@@ -293,13 +293,13 @@ class DensityRegulation(FieldRegulation):
         """
         checked = self._checked(goal)
         size = 6 if isinstance(checked, Pose) else self._arm.nv
-        moves = np.zeros(size) if velocity is None else finite_vector("velocity", velocity, size)
+        told = None if velocity is None else finite_vector("velocity", velocity, size)
         density, led_by = self._guided.density, self._distance_to(checked)
         if led_by is not density.goal_distance or not isinstance(checked, Pose):
             self._guided.lead_along(SubGoals(self._check, self._to_alone(checked), self._sensing))
             density.goal_distance = led_by
-        self.goal = self._given_goal = checked
-        self._given_velocity, self._given_time, self._moves = moves, math.nan, False
+        self.goal = checked
+        self._moving_goal.set(checked, told)
 
     def torque(self, t: float, q: ArrayLike, v: ArrayLike) -> Array:
         """Act as `Controller.torque`."""
@@ -313,24 +313,22 @@ class DensityRegulation(FieldRegulation):
 
     def _move_goal(self, t: float) -> None:
         """Put a goal that moves where it is at a time [s]."""
-        if not self._given_velocity.any():
+        goal, self._goal_moves = self._moving_goal.at(t)
+        if goal is self.goal:
             return
-        if not t >= self._given_time:
-            self._given_time = t
-        since = min(t - self._given_time, _GOES_ON)
-        self._moves, step = since < _GOES_ON, since * self._given_velocity
-        if isinstance(self._given_goal, Pose):
-            self.goal = self._given_goal.moved(step)
-            self._distance_to(self.goal)
+        self.goal = goal
+        if isinstance(goal, Pose):
+            self._distance_to(goal)
         else:
-            self.goal = self._arm.integrate(self._given_goal, step)
-            self._guided.move_goal(self.goal)
+            self._guided.move_goal(goal)
 
     def _goal_velocity(self) -> Array:
         led_by = self._guided.density.goal_distance
-        if self._moves and isinstance(led_by, PoseDistance):
-            return led_by.following(self._given_velocity)
-        return self._given_velocity if self._moves else self._at_rest
+        if not self._goal_moves.any():
+            return self._at_rest
+        if isinstance(led_by, PoseDistance):
+            return led_by.following(self._goal_moves)
+        return self._goal_moves
 
     @property
     def remark(self) -> str:

@@ -1,5 +1,7 @@
 """What feedback along a motion senses: nothing on it, and what is near where the arm is off it."""
 
+from typing import NamedTuple
+
 import numpy as np
 
 from densarm.arms.dynamics import Kinematics
@@ -15,6 +17,15 @@ from densarm.world.world import DISTANCE_TOLERANCE, World
 _INTERVAL = 0.02  # [s] of the motion between computed distances
 # Sensing distances below which the feedback of a small error would shake the arm.
 _LEAST_DISTANCE, _LEAST_JOINT_DISTANCE = 1e-3, 5e-3  # [m], [rad or m]
+
+
+class SensingDistances(NamedTuple):
+    """Sensing distances σ that fit a motion; -inf for what is not sensed."""
+
+    pairs: Array
+    """Of the pairs of a world (K,) [m]."""
+    joints: Array
+    """Of the limits of each joint (nv,) [rad or m]."""
 
 
 def require_smooth_goal(
@@ -41,10 +52,8 @@ def require_smooth_goal(
         raise InvalidValueError("density.blend_radius", 0.0, f"above 0 {reason}")
 
 
-def sensed_off(
-    world: World, motion: Motion, sensing: SensingParameters, kinematics: Kinematics
-) -> tuple[ClearanceSet, JointLimitSet]:
-    """Return pairs and joint limits, sensed nowhere on a motion but where the arm is off it.
+def sensing_distances(world: World, motion: Motion, sensing: SensingParameters) -> SensingDistances:
+    """Return how far off a motion pairs and joint limits are sensed: nothing on it.
 
     Those that the motion comes nearer than it is tracked are not sensed.
     """
@@ -57,13 +66,23 @@ def sensed_off(
     least = least_distances(world, configurations, limit) - held
     angles = arm.angles(configurations)
     inside = np.minimum(angles - arm.limits.lower, arm.limits.upper - angles).min(axis=0)
-    near = ActivePairs(world, kinematics)
-    pairs = ClearanceSet(world, motion.margin, sensing.distance, near, sensing.distance)
-    joints = JointLimitSet(arm, sensing.joint)
     share = sensing.path_share * np.minimum(least, limit), sensing.path_share * inside
-    pairs.set_sensing_distance(_worth_sensing(share[0], _LEAST_DISTANCE, sensing.distance))
-    joints.set_sensing_distance(_worth_sensing(share[1], _LEAST_JOINT_DISTANCE, sensing.joint))
-    return pairs, joints
+    return SensingDistances(
+        _worth_sensing(share[0], _LEAST_DISTANCE, sensing.distance),
+        _worth_sensing(share[1], _LEAST_JOINT_DISTANCE, sensing.joint),
+    )
+
+
+def sets_off(
+    world: World, margin: float, sensing: SensingParameters, kinematics: Kinematics
+) -> tuple[ClearanceSet, JointLimitSet]:
+    """Return pairs and joint limits, to be given the `SensingDistances` of a motion.
+
+    Pairs whose obstacle moves are sensed from the largest distance on all the same.
+    """
+    near = ActivePairs(world, kinematics)
+    pairs = ClearanceSet(world, margin, sensing.distance, near, sensing.distance)
+    return pairs, JointLimitSet(world.arm, sensing.joint)
 
 
 def _worth_sensing(wanted: Array, least: float, most: float) -> Array:

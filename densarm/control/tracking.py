@@ -30,7 +30,23 @@ from densarm.control.inverse_dynamics import (
     send,
     take_in,
 )
-from densarm.control.sensing import require_smooth_goal, sensed_off
+from densarm.control.reference_clock import (
+    CHANGE,
+    EMERGENCY,
+    LEAST_SHARE,
+    N_CLOCK,
+    RATE,
+    TIME,
+    ReferenceClock,
+    advance_clock,
+    set_rate,
+)
+from densarm.control.sensing import (
+    SensingDistances,
+    require_smooth_goal,
+    sensing_distances,
+    sets_off,
+)
 from densarm.density.goal_distance import GoalDistance, TorusDistance, torus_distance
 from densarm.density.navigation_density import (
     DensityParameters,
@@ -38,9 +54,10 @@ from densarm.density.navigation_density import (
     write_gauge_gradient,
 )
 from densarm.density.unsafe_sets import SensingParameters, UnsafeSet
+from densarm.errors import InvalidValueError
 from densarm.planning.motion import Motion, write_sample
 from densarm.values.arrays import Array
-from densarm.values.kernels import compiled, compiled_part, entry_point
+from densarm.values.kernels import compiled, entry_point
 from densarm.world.active_pairs import ActivePairs
 from densarm.world.stopping import HELD_SHARE
 from densarm.world.world import World
@@ -68,18 +85,9 @@ class DensityTracking(ToldByGoal):
     distance on. The torque is taken to be held for the motion's period: q̈_d is its mean over that
     time. State and reference are those of the time when it acts.
 
-    The reference waits for an arm that is held up: its time σ runs by
-
-    .. math::
-
-        \dddot\sigma = \omega^2 (r - \dot\sigma) - 2 \omega \ddot\sigma, \quad
-        r = \frac{1}{1 + (|e| / \epsilon)^2} \sqrt{\min_i \Big( 1 - \frac{|\hat d_i|}
-        {\tau^{max}_i - |H_i|} \Big)}
-
-    both beyond a dead zone: unknown torque leaves less for accelerations, which go with σ̇².
-
-    Where obstacles move, the velocity of the reference and of a return to it is led by `Evasion`,
-    and a servo follows that inside the acceleration limits, until the arm is back.
+    The reference waits for an arm that is held up, by its `ReferenceClock`. Where obstacles move,
+    its velocity, and that of a return to it, is led by `Evasion`, and a servo follows that inside
+    the acceleration limits, until the arm is back.
 
     `velocity` tracks it with a plant that is told velocities, which needs no masses:
 
@@ -101,8 +109,7 @@ class DensityTracking(ToldByGoal):
         evasion: makes what gives way to obstacles that move, as the class `Evasion`.
 
     Attributes:
-        motion: as given.
-        goal: where it ends (nq,).
+        motion, goal: as given or followed, and where it ends (nq,).
         tracking_error: largest |e| of a joint at the last call, zero before the first [rad or m].
 
     Raises:
@@ -126,34 +133,33 @@ class DensityTracking(ToldByGoal):
     ) -> None:
         require_smooth_goal(density, may_blend=False)
         arm = world.arm
-        self.motion = motion
-        self.goal: Array = arm.configurations(motion.position[-1])
-        self.tracking_error: float = 0.0
-        self._is_evading = False
-        self._arm = arm
+        self.tracking_error, self._is_evading = 0.0, False
+        self._arm, self._world, self._sensing, self._gains = arm, world, sensing, gains
         self._kinematics = Kinematics(arm)
+        self._pairs, self._joints = sets_off(world, motion.margin, sensing, self._kinematics)
+        self._take(motion, sensing_distances(world, motion, sensing))
         distance = goal_distance or TorusDistance(arm)
-        pairs, joints = sensed_off(world, motion, sensing, self._kinematics)
-        unsafe: list[UnsafeSet] = [pairs, joints, *unsafe_sets]
+        unsafe: list[UnsafeSet] = [self._pairs, self._joints, *unsafe_sets]
         self._density = NavigationDensity(arm, self.goal, unsafe, distance, density)
-        self._gains = gains
-        self._numbers = np.full(_N_NUMBERS + _EMERGENCY, math.nan)
+        self._numbers = np.zeros(_END)
+        self._clock = ReferenceClock(self._numbers[:N_CLOCK])
         if arm.links_without_mass:
             self.velocity(0.0, self.goal, np.zeros(arm.nv))
             return
         unlimited = np.full(arm.nv, math.inf)
-        self._evasion = evasion(world, pairs.pairs, motion.margin)
+        self._evasion = evasion(world, self._pairs.pairs, motion.margin)
         self._dynamics = InverseDynamics(arm, unlimited, self._kinematics, motion.period, actuation)
         kappa = distance.kappa if isinstance(distance, TorusDistance) else math.nan
         self._has_own_distance = math.isnan(kappa)
-        constants = motion.period, actuation.delay, kappa, gains.position, gains.velocity
-        self._numbers[_PERIOD:_N_NUMBERS] = *constants, 1.0
+        self._numbers[_PERIOD:-2] = motion.period, actuation.delay, kappa
+        self._numbers[-2:] = gains.position, gains.velocity
         self._sample = np.zeros((6, arm.nv))
-        own = self._numbers, self._sample, motion.knots, self._dynamics.arrays
-        self._arrays, still = (self._density.log_psi_gradient, *own), np.zeros(arm.nv)
+        own, still = (self._numbers, self._sample, self._dynamics.arrays), np.zeros(arm.nv)
+        self._arrays = self._density.log_psi_gradient, *own
         self._sample[_WEIGHTS] = getattr(distance, "weights", 1.0)
         self._sample[_MOST] = _PAUSE_SHARE * arm.limits.acceleration
-        self._kernel = entry_point(_tracking_torque, 0.0, self.goal, still, 0.0, *self._arrays)
+        types = 0.0, self.goal, still, 0.0, motion.knots, *self._arrays
+        self._kernel = entry_point(_tracking_torque, *types)
         for t in (0.0, motion.period, math.nan):  # kernels are loaded before a control loop
             self.torque(t, self.goal, still)
         self.tracking_error = 0.0
@@ -170,7 +176,7 @@ class DensityTracking(ToldByGoal):
         self._dynamics.compute_terms(q, v)
         if self._has_own_distance:  # asked twice, since the first tells the reference's time
             self._act(float(t), q, v)
-            ahead = self.reference_time + self._numbers[_DELAY] * self._numbers[_RATE]
+            ahead = self.reference_time + self._numbers[_DELAY] * self._numbers[RATE]
             self._dynamics.rows[ATTRACT] = self._attraction(q, self.motion.sample(ahead).position)
         else:
             self._density.update_psi(q)
@@ -182,7 +188,8 @@ class DensityTracking(ToldByGoal):
 
     def _act(self, t: float, q: Array, v: Array) -> None:
         """Send the torque at a state, of which all terms and Ψ are known."""
-        self.tracking_error = self._kernel(t, q, v, self._density.log_psi, *self._arrays)
+        knots, log_psi = self.motion.knots, self._density.log_psi
+        self.tracking_error = self._kernel(t, q, v, log_psi, knots, *self._arrays)
 
     def _evade(self, q: Array) -> None:
         """Replace the torque by one that gives way, and that returns to the reference.
@@ -192,11 +199,11 @@ class DensityTracking(ToldByGoal):
         numbers, rows = self._numbers, self._dynamics.rows
         wanted, limits = np.empty(self._arm.nv), self._arm.limits
         is_off = _return(numbers, rows, self._sample, self._gains.rate, limits.acceleration, wanted)
-        is_off |= self.is_moving and abs(1.0 - numbers[_RATE]) > _HANDED_OVER[1]
+        is_off |= self.is_moving and abs(1.0 - numbers[RATE]) > _HANDED_OVER[1]
         wanted, gives_way = self._evasion.velocity(q, rows[AHEAD_VELOCITY], wanted)
         self._is_evading = gives_way or (self._is_evading and bool(is_off))
         if self._is_evading:
-            numbers[_EMERGENCY] = 0.0
+            numbers[EMERGENCY] = min(numbers[EMERGENCY], 0.0)
             rows[RATE_LIMIT] = self._dynamics.elapsed * rows[TORQUE_RATE]
             ahead = None if gives_way else rows[BRAKE]
             self._evasion.send_torque(self._dynamics, wanted, ahead)
@@ -206,9 +213,37 @@ class DensityTracking(ToldByGoal):
         """Whether an obstacle moves, and the arm gave way at the last call, or still returns."""
         return self._is_evading and self._evasion.sees_motion
 
+    def _take(self, motion: Motion, sensed: SensingDistances) -> None:
+        self.motion, self.goal = motion, self._arm.configurations(motion.position[-1])
+        self._pairs.set_sensing_distance(sensed.pairs)
+        self._joints.set_sensing_distance(sensed.joints)
+
+    def follow(self, motion: Motion, q: ArrayLike, sensed: SensingDistances | None = None) -> None:
+        """Track another motion from the next call on, its reference at rest where it is nearest.
+
+        Args:
+            motion: of the same period and margin.
+            q: configuration of the arm (nq,), which may move; torques change no faster than ever.
+            sensed: what `sensing_distances` has for it; None to compute it, in some 10 ms.
+
+        Raises:
+            InvalidValueError: a motion of another period or margin.
+        """
+        for name in ("period", "margin"):
+            given, own = getattr(motion, name), getattr(self.motion, name)
+            if given != own:
+                raise InvalidValueError(f"{name} of the motion", given, f"{own}, as before")
+        self._take(motion, sensed or sensing_distances(self._world, motion, self._sensing))
+        self.resume(q)
+        self._clock.join()
+
     def pause(self) -> None:
         """Let the reference's clock come to rest, so that the arm rests on the motion."""
-        self._numbers[WANTED_RATE] = 0.0
+        self._clock.pause()
+
+    def lead_clock(self, to: float) -> None:
+        """Take the rate that the clock is to have a period nearer to another, between 0 and 1."""
+        self._clock.lead(to, self.motion, self._arm.limits.acceleration)
 
     def resume(self, q: ArrayLike | None = None, within: float | Array = math.inf) -> bool:
         """Let the reference go on after a pause, or after the arm was stopped by another.
@@ -221,20 +256,21 @@ class DensityTracking(ToldByGoal):
         Returns:
             Whether it goes on: it does not from farther off.
         """
+        time = None
         if q is not None:
             wanted = self._arm.configurations(self.motion.position)
             off = np.abs(self._arm.difference(wanted, np.asarray(q, np.float64)))
             nearest = int((off / np.where(np.isinf(within), 1.0, within)).max(axis=1).argmin())
             if not (off[nearest] <= within).all():
                 return False
-            self._numbers[_GOES_ON_FROM] = nearest * self.motion.period
-        self._numbers[WANTED_RATE] = 1.0
+            time = nearest * self.motion.period
+        self._clock.resume(time)
         return True
 
     @property
     def is_paused(self) -> bool:
         """Whether the reference was made to pause, and rests."""
-        return self._numbers[WANTED_RATE] == 0.0 and bool(self._numbers[_RATE] < _PAUSED)
+        return self._clock.is_paused
 
     @property
     def dynamics(self) -> InverseDynamics:
@@ -244,7 +280,7 @@ class DensityTracking(ToldByGoal):
     @property
     def reference_time(self) -> float:
         """The reference's own time σ at the last call [s]: it waits where the arm is held up."""
-        return float(self._numbers[_TIME])
+        return self._clock.time
 
     @property
     def reference(self) -> Array:
@@ -260,7 +296,7 @@ class DensityTracking(ToldByGoal):
         """Act as `VelocityController.velocity`, v being the velocity commanded last."""
         q, v = checked_state(self._arm, q, v)
         self._kinematics.update(q)
-        motion, limits, self._numbers[_TIME] = self.motion, self._arm.limits, t
+        motion, limits, self._numbers[TIME] = self.motion, self._arm.limits, t
         now, then = motion.sample(t), motion.sample(t + motion.period)
         follow = (then.position - now.position) / motion.period
         wanted = follow + self._gains.rate * self._attraction(q, now.position)
@@ -288,21 +324,13 @@ class DensityTracking(ToldByGoal):
 
 
 _POSITION, _VELOCITY, _ACCELERATION, _ERROR, _WEIGHTS, _MOST = 0, 1, 2, 3, 4, 5  # rows of a sample
-
-# Numbers of the kernel: the reference's time σ, how far it is behind, and its derivatives, which
-# are kept as they were at the last time asked for.
-_TIME, _LAG, _RATE, _CHANGE, _EMERGENCY, _LAST, _GOES_ON_FROM = 0, 1, 2, 3, 4, 5, 6
-_PERIOD, _DELAY, _KAPPA, _POSITION_GAIN, _VELOCITY_GAIN, WANTED_RATE = 7, 8, 9, 10, 11, 12
-_N_NUMBERS, _KEPT = 13, 12  # how many, and how far behind the clock its copy is
+# Numbers of the kernel after those of the clock.
+_PERIOD, _DELAY, _KAPPA, _POSITION_GAIN, _VELOCITY_GAIN, _END = range(N_CLOCK, N_CLOCK + 6)
 
 _EVADED_SHARE = 0.5  # of twice the acceleration limits, with which a return to the reference stops
 _HANDED_OVER = 0.001, 0.02  # of error, and of velocity or rate, that tracking takes over from
-_CLOCK_RATE = 20.0  # ω [1/s]
 _PAUSE_SHARE = 0.95  # of the acceleration limits, that pausing takes with the motion
-_PAUSED = 0.01  # σ̇ below which the reference counts as at rest
-_WAITING_ERROR, _FREE_ERROR = 0.03, 0.005  # ε, and what the reference does not wait for [rad or m]
 _FREE_LOAD = 0.05  # of the torque left, which unknown torque may take without slowing the reference
-_LEAST_SHARE = 0.1  # of torque that counts as left
 _RETURN_SHARE = 0.25  # of the velocity limits, at which an arm returns from a push
 _PUSHED, _RETURNED = 0.5, 0.05  # velocity off by a push [rad/s or m/s], error after it [rad or m]
 _LARGEST_GAIN = 0.4  # of K_v times the time that a torque is late
@@ -313,7 +341,7 @@ def _return(
     numbers: Array, rows: Array, sample: Array, gain: float, most: Array, wanted: Array
 ) -> bool:
     """Write the velocity back to the reference; return whether the arm is off it."""
-    rate, is_off = numbers[_RATE], False
+    rate, is_off = numbers[RATE], False
     for i in range(most.size):
         error, follow = sample[_ERROR, i], rate * sample[_VELOCITY, i]
         off = abs(error)
@@ -330,22 +358,19 @@ def _tracking_torque(
     q: Array,
     v: Array,
     log_psi: float,
+    knots: Array,
     log_psi_gradient: Array,
     numbers: Array,
     sample: Array,
-    knots: Array,
     arrays: DynamicsArrays,
 ) -> float:
-    """Write and send the torque of `DensityTracking`; return the tracking error.
-
-    It is one kernel, of few arguments, since every call and every argument has its cost.
-    """
+    """Send the torque of `DensityTracking`, by one call, which has its cost; return the error."""
     nonlinear, rows, joint_index, begins = arrays[1], arrays[3], arrays[6], take_in(t, q, v, arrays)
     period, elapsed = numbers[_PERIOD], arrays[5][ELAPSED]
-    _advance_clock(t, begins, elapsed, numbers)
-    rate = numbers[_RATE]
+    advance_clock(t, begins, elapsed, numbers)
+    rate = numbers[RATE]
     late = elapsed + numbers[_DELAY]
-    u = (numbers[_TIME] + rate * numbers[_DELAY]) / period
+    u = (numbers[TIME] + rate * numbers[_DELAY]) / period
     write_sample(u, u + 0.5 * rate * elapsed / period, period, knots, sample)
     error, attract, largest, left, n = sample[_ERROR], rows[ATTRACT], 0.0, 1.0, nonlinear.size
     fastest, slowest = 0.0, -math.inf  # the latter of σ̈, for accelerations to keep their limits
@@ -356,7 +381,7 @@ def _tracking_torque(
         error[i], largest = off, max(largest, abs(off))
         fastest = max(fastest, abs(rows[AHEAD_VELOCITY, i] - rate * sample[_VELOCITY, i]))
         limit = rows[EFFORT_LIMIT, i]
-        room = max(limit - abs(nonlinear[i]), _LEAST_SHARE * limit)
+        room = max(limit - abs(nonlinear[i]), LEAST_SHARE * limit)
         left = min(left, 1.0 + _FREE_LOAD - abs(rows[DISTURBANCE, i]) / room)
     if not math.isnan(numbers[_KAPPA]):
         distance = torus_distance(error, joint_index, sample[_WEIGHTS], numbers[_KAPPA])
@@ -369,42 +394,17 @@ def _tracking_torque(
         pull = min(max(stiffness * attract[i], -most), most)
         attract[i] = pull - damping * (rows[AHEAD_VELOCITY, i] - rate * velocity)
         a = rate * rate * sample[_ACCELERATION, i]
-        rows[BRAKE, i] = a + numbers[_CHANGE] * velocity
+        rows[BRAKE, i] = a + numbers[CHANGE] * velocity
         if velocity != 0.0:
             least = -(sample[_MOST, i] + math.copysign(a, a * velocity)) / abs(velocity)
             slowest = max(slowest, min(least, 0.0))
-    if fastest > _PUSHED or largest < _RETURNED:
-        numbers[_EMERGENCY] = fastest > _PUSHED
-    if numbers[_EMERGENCY] > 0.0:
-        for i in range(n):
-            rows[RATE_LIMIT, i] = math.inf
+    if numbers[EMERGENCY] < 0.0:
+        numbers[EMERGENCY] += elapsed
+    elif fastest > _PUSHED or largest < _RETURNED:
+        numbers[EMERGENCY] = fastest > _PUSHED
+    if numbers[EMERGENCY] > 0.0:
+        rows[RATE_LIMIT] = math.inf
     robust_torque(damping, elapsed, late, arrays)
     send(arrays)
-    waiting = max(largest - _FREE_ERROR, 0.0) / _WAITING_ERROR
-    wanted = numbers[WANTED_RATE] * math.sqrt(max(left, _LEAST_SHARE)) / (1.0 + waiting * waiting)
-    step = min(_CLOCK_RATE * elapsed, 1.0)
-    change = numbers[_CHANGE] + step * (_CLOCK_RATE * (wanted - rate) - 2.0 * numbers[_CHANGE])
-    if wanted == 0.0:
-        change = max(change, slowest)
-    numbers[_CHANGE], numbers[_RATE] = change, max(rate + elapsed * change, 0.0)
+    set_rate(largest, left, slowest, elapsed, numbers)
     return largest
-
-
-@compiled_part
-def _advance_clock(t: float, begins: bool, elapsed: float, numbers: Array) -> None:
-    """Let the reference's time go on to t, by the rate that the last call found."""
-    if not math.isnan(numbers[_GOES_ON_FROM]):
-        numbers[_LAG], numbers[_RATE] = t - numbers[_GOES_ON_FROM], 0.0
-        numbers[_CHANGE] = numbers[_EMERGENCY] = 0.0
-        numbers[_GOES_ON_FROM] = math.nan
-    elif begins or math.isnan(numbers[_TIME]):
-        numbers[_LAG] = numbers[_CHANGE] = numbers[_EMERGENCY] = 0.0
-        numbers[_RATE] = 1.0
-    elif t == numbers[_LAST]:  # asked again, which moves no clock
-        for k in range(_LAG, _LAST):
-            numbers[k] = numbers[k + _KEPT]
-    else:
-        numbers[_LAG] += (1.0 - numbers[_RATE]) * elapsed
-    for k in range(_LAG, _LAST):
-        numbers[k + _KEPT] = numbers[k]
-    numbers[_LAST], numbers[_TIME] = t, t - numbers[_LAG]

@@ -183,6 +183,10 @@ class PlanningError(DensarmError):
         self.outcome, self.detail, self.motion = outcome, detail, motion
         super().__init__(f"{outcome}: {detail}")
 
+    def __reduce__(self) -> tuple[type["PlanningError"], tuple[Outcome, str]]:
+        """Leave the motion behind, whose world cannot go to another process."""
+        return PlanningError, (self.outcome, self.detail)
+
 
 _MOST_SAMPLES = 10**6
 

@@ -3,6 +3,7 @@
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -14,16 +15,18 @@ from densarm.certificates.records import (
     record_rantzer,
 )
 from densarm.control.controller import Controller
+from densarm.control.goal_on_obstacle import GoalOnObstacle
 from densarm.control.passive import PassiveTracking
 from densarm.control.regulation import DensityRegulation
-from densarm.control.replanning import Replanning
+from densarm.control.replanning import PlanningInLoop, Replanning
 from densarm.control.tracking import DensityTracking
 from densarm.density.goal_distance import InertiaDistance, TorusDistance
 from densarm.density.navigation_density import density_towards
-from densarm.planning.guide import Guide, GuidePath
+from densarm.planning.guide import Guide, GuidePath, PlannedPath
 from densarm.planning.motion import Motion, PlanningError
 from densarm.planning.plan import GUIDES, inside_limits, plan_motion, plan_path
-from densarm.scenarios.scenario import ControlForm, Scenario, load_scenario
+from densarm.scenarios.control import ControlForm
+from densarm.scenarios.scenario import Scenario, load_scenario
 from densarm.simulation.disturbances import Disturbances
 from densarm.simulation.plants import Plant
 from densarm.simulation.run import Run
@@ -116,9 +119,10 @@ def run_by(
         return replace(ended, plan_time=time.perf_counter() - began if searched else 0.0)
     elapsed = time.perf_counter() - began
     told = scenario.disturbances if plant is None else None
-    if drive.goal is not None:
+    pose = scenario.moving_goal
+    if drive.goal is not None or pose is not None:
         task = replace(task, goal=drive.goal)
-    done = simulate_task(task, world, drive.controller, plant, told, on_progress)
+    done = simulate_task(task, world, drive.controller, plant, told, on_progress, pose)
     if done.outcome == Outcome.INFEASIBLE:
         return done
     done = replace(done, plan_time=drive.plan_time, preparation_time=elapsed)
@@ -144,29 +148,40 @@ def by_density(
         PlanningError: there is no way, or, without a guide's path, the density is stuck at once.
     """
     world = world or scenario.world
-    drive = _drive(scenario, world, scenario.start, guide)
-    goal = scenario.goal if drive.goal is None else drive.goal
+    if (pose := scenario.moving_goal) is not None:
+        law = _law(scenario) | _regulation(scenario)
+        return Drive(GoalOnObstacle(world, pose, scenario.goal_follows, **law))
+    found = _planned(scenario, world, scenario.start, guide)
+    controller = _controller(scenario, world, found)
+    motion = found if isinstance(found, Motion) else None
+    goal = scenario.goal if found.goal is None else found.goal
     scenario = replace(scenario, goal=goal, goals=()) if scenario.goals else scenario
+    drive = Drive(controller, found.plan_time, motion, found.path, found.goal)
     is_told_velocity = scenario.control.form == ControlForm.VELOCITY
     if not replans or is_told_velocity or (guide is None and scenario.control.guide == "direct"):
         return drive
 
-    def plan_again(q: Array) -> Controller | None:
-        try:
-            return _drive(scenario, world, q, guide).controller
-        except PlanningError:
-            return None
+    def plan_again(predicted: World, q: Array) -> Callable[[Array], Controller]:
+        planned = _planned(scenario, predicted, q, guide)
+        if isinstance(planned, Motion) and isinstance(controller, DensityTracking):
+            return partial(_following, controller, replace(planned, world=world))
+        return lambda _: _controller(scenario, world, planned)
 
-    controller = Replanning(
+    replanning = Replanning(
         scenario.arm,
         goal,
-        drive.controller,
-        plan_again,
+        controller,
+        PlanningInLoop(world, plan_again, scenario.simulation.planning_time),
         patience=0.5 * scenario.simulation.stall_time,
         gains=scenario.gains_of(ControlForm.REGULATION),
         period=scenario.simulation.control_period,
     )
-    return replace(drive, controller=controller)
+    return replace(drive, controller=replanning)
+
+
+def _following(tracking: DensityTracking, motion: Motion, q: Array) -> Controller:
+    tracking.follow(motion, q)
+    return tracking
 
 
 def plan(
@@ -210,39 +225,49 @@ def _asked(scenario: Scenario, guide: Guide | str | None) -> dict[str, Any]:
     }
 
 
-def _drive(scenario: Scenario, world: World, start: Array, guide: Guide | None) -> Drive:
-    control = scenario.control
-    law: dict[str, Any] = {"density": scenario.density, "sensing": scenario.sensing}
-    if control.form in {ControlForm.REGULATION, ControlForm.PLAIN}:
-        planned = plan_path(world, start, **_asked(scenario, guide))
-        is_plain = control.form == ControlForm.PLAIN
-        regulation = DensityRegulation(
-            world,
-            planned.goal,
-            path=planned.path,
-            plain=is_plain,
-            margin=control.margin,
-            gains=scenario.law_gains,
-            actuation=scenario.actuation,
-            period=scenario.simulation.control_period,
-            goal_distance=None if is_plain else scenario.goal_distance,
-            speed=scenario.speed,
-            **law,
-        )
-        return Drive(regulation, planned.plan_time, path=planned.path, goal=planned.goal)
+def _planned(
+    scenario: Scenario, world: World, start: Array, guide: Guide | None
+) -> PlannedPath | Motion:
+    """Return the plan that a scenario's form of control needs."""
+    if scenario.control.form in {ControlForm.REGULATION, ControlForm.PLAIN}:
+        return plan_path(world, start, **_asked(scenario, guide))
     try:
-        motion = plan(scenario, guide, world=world, start=start)
+        return plan(scenario, guide, world=world, start=start)
     except PlanningError as error:
         if error.motion is None:
             raise
-        motion = error.motion  # the arm goes as far as the density leads, which the record shows
-    distance = TorusDistance(scenario.arm, kappa=control.kappa)
-    law |= {"gains": scenario.law_gains, "goal_distance": distance, "actuation": scenario.actuation}
+        return error.motion  # the arm goes as far as the density leads, which the record shows
+
+
+def _controller(scenario: Scenario, world: World, planned: PlannedPath | Motion) -> Controller:
+    """Return what drives an arm along a plan, in a scenario's form of control."""
+    control, law = scenario.control, _law(scenario)
+    if isinstance(planned, PlannedPath):
+        law |= _regulation(scenario)
+        is_plain = control.form == ControlForm.PLAIN
+        law["goal_distance"] = None if is_plain else scenario.goal_distance
+        return DensityRegulation(world, planned.goal, path=planned.path, plain=is_plain, **law)
+    law["goal_distance"] = TorusDistance(scenario.arm, kappa=control.kappa)
     if control.passive_speed is None:
-        tracking: Controller = DensityTracking(world, motion, **law)
-    else:
-        tracking = PassiveTracking(world, motion, control.passive_speed, **law)
-    return Drive(tracking, motion.plan_time, motion, motion.path, motion.goal)
+        return DensityTracking(world, planned, **law)
+    return PassiveTracking(world, planned, control.passive_speed, **law)
+
+
+def _law(scenario: Scenario) -> dict[str, Any]:
+    return {
+        "density": scenario.density,
+        "sensing": scenario.sensing,
+        "gains": scenario.law_gains,
+        "actuation": scenario.actuation,
+    }
+
+
+def _regulation(scenario: Scenario) -> dict[str, Any]:
+    return {
+        "margin": scenario.control.margin,
+        "period": scenario.simulation.control_period,
+        "speed": scenario.speed,
+    }
 
 
 def records(run: Run) -> tuple[EnergyRecord, RantzerRecord]:

@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
-from enum import StrEnum
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -20,83 +19,28 @@ from densarm.control.disturbance_observer import ActuationParameters
 from densarm.control.sensing import require_smooth_goal
 from densarm.control.speed_law import SpeedParameters
 from densarm.control.tracking import TRACKING_GAINS
-from densarm.density.goal_distance import KAPPA_MIN, TorusDistance, joint_weights
+from densarm.density.goal_distance import TorusDistance, joint_weights
 from densarm.density.navigation_density import DensityParameters
 from densarm.density.unsafe_sets import SensingParameters
 from densarm.errors import DensarmError, FileContentError, InvalidValueError, UnknownNameError
 from densarm.planning.goals import candidates, goal_list
 from densarm.planning.guide import PlanningParameters
 from densarm.planning.motion import TimingParameters
-from densarm.planning.plan import GUIDES, PATH_MARGIN, PLANNING_ALPHA
+from densarm.scenarios.control import ControlForm, ControlParameters
 from densarm.scene.loading import parse_scene
 from densarm.scene.scene import Scene
 from densarm.simulation.disturbances import Disturbances
 from densarm.values.arrays import Array
 from densarm.values.checks import (
     finite_vector,
-    non_negative,
     non_negative_integer,
     one_of,
-    positive,
 )
 from densarm.values.documented import documented
 from densarm.values.files import read_toml
 from densarm.values.tables import parse_table
 from densarm.world.swept_check import SweptCheck
 from densarm.world.world import World
-
-
-class ControlForm(StrEnum):
-    """Which density controller drives the arm."""
-
-    TRACKING = "tracking"
-    """Along the timed trajectory of the planning system, [ZNV] eq. 17."""
-    REGULATION = "regulation"
-    """To the goal by way of the sub-goals, [ZNV] eq. 17 with constant q_d."""
-    PLAIN = "plain"
-    """u = ∇ρ + d(q, q̇)."""
-    VELOCITY = "velocity"
-    """Along the timed trajectory by commanded velocities, which needs no masses of the arm. Those
-    held for several time steps jump beyond the acceleration limits, which is not certified."""
-
-
-@dataclass(frozen=True)
-class ControlParameters:
-    """Which controller, and the guide it follows.
-
-    Raises:
-        InvalidValueError: a value out of its range.
-    """
-
-    form: ControlForm = ControlForm.TRACKING
-    """The controller."""
-    guide: str = "auto"
-    """The guide, unless the caller names another: "auto", "density", "direct" or "path"."""
-    margin: float = 0.0
-    """Safety margin m: a pair is unsafe at this distance and below [m]."""
-    path_margin: float = PATH_MARGIN
-    """Distance that paths keep beyond m, less in narrow spaces and near start and goal [m]."""
-    kappa: float = 1.0
-    """κ of the goal distance, between product and sum; the plain form has the sum."""
-    passive_speed: float | None = None
-    """Passive safety in tracking: the arm rests before anything that moves, up to this speed [m/s],
-    can reach it, and evades nothing; None for evasion."""
-    planning_alpha: float = PLANNING_ALPHA
-    """α of the planning system where its curve is tracked."""
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "form", ControlForm(one_of("form", self.form, list(ControlForm))))
-        one_of("guide", self.guide, GUIDES)
-        non_negative("margin", self.margin)
-        non_negative("path_margin", self.path_margin)
-        positive("planning_alpha", self.planning_alpha)
-        if self.passive_speed is not None:
-            positive("passive_speed", self.passive_speed)
-            if self.form != ControlForm.TRACKING:
-                allowed = f"left out, or form 'tracking', not {str(self.form)!r}"
-                raise InvalidValueError("passive_speed", self.passive_speed, allowed)
-        if not self.kappa >= KAPPA_MIN:
-            raise InvalidValueError("kappa", self.kappa, f"a number >= {KAPPA_MIN}, or infinity")
 
 
 @documented
@@ -150,6 +94,9 @@ class Scenario:
     """Seed of every random choice."""
     goals: Sequence[Array | Pose] = ()
     """What `goal` was chosen from, of which any will do: a plan chooses again."""
+    goal_follows: str = ""
+    """Name of the obstacle that the goal keeps to as that moves, a single pose in regulation; empty
+    for one at rest."""
 
     def __post_init__(self) -> None:
         non_negative_integer("seed", self.seed)
@@ -164,6 +111,8 @@ class Scenario:
             object.__setattr__(self, "goal", ranked[0].q)
         else:
             object.__setattr__(self, "goal", goals[0])
+        if self.goal_follows:
+            self._require_goal_that_follows()
         self.disturbances.require_fit(self.arm)
         one_of("plant", self.plant, PLANTS)
         joint_weights("density.weights", self.arm, self.density.weights)
@@ -179,10 +128,26 @@ class Scenario:
     def __repr__(self) -> str:
         return f"Scenario({self.name!r}, {self.arm}, {self.scene})"
 
+    def _require_goal_that_follows(self) -> None:
+        name, form = self.goal_follows, self.control.form
+        if name not in (obstacles := [item.name for item in self.scene]):
+            raise UnknownNameError("obstacle of task.goal_follows", name, obstacles)
+        if len(self.goals) != 1 or not isinstance(self.goals[0], Pose):
+            raise InvalidValueError("task.goal_follows", name, "left out where the goal is no pose")
+        if form != ControlForm.REGULATION:
+            allowed = f"'regulation' where the goal follows {name!r}"
+            raise InvalidValueError("control.form", str(form), allowed)
+
     @cached_property
     def world(self) -> World:
         """The arm among the obstacles, made when first asked for."""
         return World(self.arm, self.scene)
+
+    @property
+    def moving_goal(self) -> Pose | None:
+        """The goal that keeps to an obstacle, where it is at time zero; None for one at rest."""
+        goal = self.goals[0] if self.goal_follows else None
+        return goal if isinstance(goal, Pose) else None
 
     def gains_of(self, form: ControlForm) -> Gains:
         """Return K_p and K_v, as given or as a form of control has them by default."""
@@ -211,6 +176,7 @@ class Scenario:
             settings={
                 "seed": self.seed,
                 **({"goals": _goals_json(self.arm, self.goals)} if self.goals else {}),
+                **({"goal_follows": self.goal_follows} if self.goal_follows else {}),
                 **{key: asdict(getattr(self, key)) for key in _SETTINGS},
                 "gains": asdict(self.law_gains),
             },
@@ -234,6 +200,7 @@ class Scenario:
         return cls(
             **{key: getattr(task, key) for key in _SHARED},
             seed=settings.get("seed", 0),
+            goal_follows=settings.get("goal_follows", ""),
             goals=tuple(_one_goal(task.arm, "goals", item) for item in settings.get("goals", ())),
             disturbances=parse_table("disturbances", Disturbances, task.disturbances),
             **{
@@ -303,6 +270,7 @@ def _parse(path: Path, data: dict[str, Any]) -> Scenario:
         scene=Scene(scene),
         start=_configuration(arm, "task.start", task.start),
         goal=_goal(arm, "task.goal", task.goal),
+        goal_follows=task.goal_follows,
         plant=data.get("plant", PLANTS[0]),
         seed=data.get("seed", 0),
         **{
@@ -338,6 +306,7 @@ class _RobotTable:
 class _TaskTable:
     start: str | tuple[float, ...] = ()
     goal: Any = field(default_factory=list)
+    goal_follows: str = ""
 
 
 def _parse_robot(folder: Path, table: _RobotTable) -> Arm:

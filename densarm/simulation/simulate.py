@@ -59,8 +59,9 @@ def simulate(
     It ends where the arm has held the goal, where it touches something, where it rests away from
     the goal for too long, or when the time is up. Obstacles with a motion move along, from time
     zero on; the world is left as it is in the end. A goal is taken to be the controller's own
-    attribute `goal`; without any the run ends by contact or time. A pose counts as held within
-    0.5 mm and 0.005 rad, and the configuration that holds it is the goal of the record then.
+    attribute `goal`, which may move if it is a pose; without any the run ends by contact or time. A
+    pose counts as held within 0.5 mm and 0.005 rad, and the configuration that holds it is the goal
+    of the record then.
 
     Args:
         world: the arm among obstacles, as they are now, or in motion.
@@ -158,8 +159,7 @@ def simulate_task(
     if fault := infeasibility(SweptCheck(world, task.margin), {"start": task.start}):
         return Run.at_rest(task, world, Outcome.INFEASIBLE, fault)
     signals = Signals(told, world.arm, parameters.dt)
-    to_pose = None if pose is None else PoseDistance(world.arm, pose)
-    return _Loop(task, world, controller, driven, signals, to_pose).run(on_progress)
+    return _Loop(task, world, controller, driven, signals, pose).run(on_progress)
 
 
 @dataclass(eq=False)
@@ -171,13 +171,15 @@ class _Loop:
     controller: Controller | VelocityController
     plant: Plant
     signals: Signals
-    to_pose: PoseDistance | None
+    pose: Pose | None
     q: list[Array] = field(default_factory=list)
     v: list[Array] = field(default_factory=list)
     clearance: list[float] = field(default_factory=list)
 
     def __post_init__(self) -> None:
         self._pairs = NearPairs(self.world)
+        self.to_pose = None if self.pose is None else PoseDistance(self.world.arm, self.pose)
+        self._goal_is_own = getattr(self.controller, "goal", None) is self.pose
 
     def run(self, on_progress: OnProgress) -> Run:
         task, p = self.task, self.task.simulation
@@ -266,6 +268,8 @@ class _Loop:
         if np.abs(v).max() > REACHED_VELOCITY:
             return False
         if self.to_pose is not None:
+            if self._goal_is_own and isinstance(now := getattr(self.controller, "goal", 0), Pose):
+                self.to_pose.set_pose(now)
             position, turn = self.to_pose.off(q)
             return max(position / REACHED_POSE[0], turn / REACHED_POSE[1]) <= _HELD_SHARE
         return (

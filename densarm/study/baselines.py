@@ -16,8 +16,9 @@ from densarm.control.regulation import FieldRegulation, VelocityField
 from densarm.control.speed_law import SpeedLaw
 from densarm.density.unsafe_sets import SensingParameters
 from densarm.planning.motion import Motion, PlanningError
+from densarm.scenarios.control import ControlForm
 from densarm.scenarios.run import Drive, by_density
-from densarm.scenarios.scenario import ControlForm, Scenario
+from densarm.scenarios.scenario import Scenario
 from densarm.study.control_density import ControlDensity
 from densarm.study.fields import (
     BarrierField,

@@ -12,8 +12,9 @@ from densarm.control.controller import Controller
 from densarm.control.speed_law import SpeedParameters
 from densarm.errors import InvalidValueError, UnknownNameError
 from densarm.planning.motion import TimingParameters
+from densarm.scenarios.control import ControlForm
 from densarm.scenarios.run import Drive, run_by
-from densarm.scenarios.scenario import ControlForm, Scenario
+from densarm.scenarios.scenario import Scenario
 from densarm.simulation.simulate import OnProgress
 from densarm.study.baselines import BASELINES, DENSITIES, MAIN_PARAMETERS
 from densarm.study.conditions import Condition

@@ -18,8 +18,9 @@ from densarm.arms.arm import Arm, load_arm
 from densarm.certificates.task import PLANTS, REACHED_POSITION, REACHED_VELOCITY
 from densarm.errors import FileContentError, InvalidValueError
 from densarm.planning.motion import PlanningError, TimingParameters
+from densarm.scenarios.control import ControlParameters
 from densarm.scenarios.run import run as run_scenario
-from densarm.scenarios.scenario import ControlParameters, Scenario
+from densarm.scenarios.scenario import Scenario
 from densarm.scene.loading import MotionProblem
 from densarm.simulation.disturbances import Disturbances
 from densarm.simulation.run import Run

@@ -10,7 +10,7 @@ from densarm.errors import InvalidValueError, SceneChangedError, UnknownNameErro
 from densarm.scene.obstacles import Obstacle
 from densarm.scene.scene import Scene
 from densarm.values.arrays import Array
-from densarm.values.checks import finite_number
+from densarm.values.checks import finite_number, non_negative
 from densarm.world.placed_obstacle import PlacedObstacle, checked_velocity
 
 _LONGEST_WAY = 1e4  # [m], beyond which sums of small steps would round off too much
@@ -75,6 +75,19 @@ class ChangingObstacles:
             now = (slot.present() for slot in self._present.values())
             self._scene = Scene(now, self._attachments)
         return self._scene
+
+    def predicted(self, ahead: float) -> Scene:
+        """Return the obstacles at rest where they will be, if they go on as they do now.
+
+        Args:
+            ahead: in how long [s].
+
+        Raises:
+            InvalidValueError: a time that is negative or not finite.
+        """
+        ahead = non_negative("ahead", ahead)
+        there = (slot.after(ahead, self._origin) for slot in self._present.values())
+        return Scene(there, self._attachments)
 
     @property
     def pairs(self) -> tuple[tuple[str, str], ...]:
@@ -151,6 +164,10 @@ class ChangingObstacles:
             UnknownNameError: no such obstacle.
         """
         return self._slot(name).velocity.copy()
+
+    def obstacle_pose(self, name: str) -> Array:
+        """Return where an obstacle is: x y z [m] and quaternion x y z w (7,); else as above."""
+        return self._slot(name).pose + self._origin
 
     def motion_way(self, begin: float, end: float) -> Array:
         """Return how far a point of each pair's obstacle goes at most between two times [s].

@@ -38,7 +38,8 @@ class PlacedObstacle:
         self._ways, self._twists = ways, twists
         self.gone = 0.0
         """As the ways [m]."""
-        self._pose = np.zeros(7)  # x y z and quaternion, seen from the model's origin
+        self.pose = np.zeros(7)
+        """x y z [m] and quaternion, seen from the model's origin."""
         self.velocity = np.zeros(6)
         self.told: Array | None = None
         """Pose in the world that it was moved to; None if it is that of the obstacle."""
@@ -76,9 +77,19 @@ class PlacedObstacle:
             self.obstacle, self.told = replace(self.obstacle, **pose, motion=None), None
         return self.obstacle
 
+    def after(self, duration: float, origin: Array) -> Obstacle:
+        """Return the obstacle at rest where its velocity leads it, seen from a point as `hold`."""
+        if self.obstacle.motion is None and not self.velocity.any():
+            return self.present()
+        step, now = duration * self.velocity, pin.XYZQUATToSE3(self.pose + origin)
+        turned = pin.SE3(pin.exp3(step[3:]) @ now.rotation, now.translation + step[:3])
+        *position, x, y, z, w = pin.SE3ToXYZQUAT(turned).tolist()
+        pose: dict[str, Any] = {"position": position, "orientation_xyzw": (x, y, z, w)}
+        return replace(self.obstacle, **pose, motion=None)
+
     def checked_pose(self, position: ArrayLike, orientation_xyzw: ArrayLike | None) -> Array:
         """Return a pose (7,) in the world, turned as it is if by None; errors as of an obstacle."""
-        turned: Any = self._pose[3:] if orientation_xyzw is None else orientation_xyzw
+        turned: Any = self.pose[3:] if orientation_xyzw is None else orientation_xyzw
         if _is_vector(position, 3) and _is_vector(turned, 4):  # as a control loop has them
             pose = np.empty(7)
             pose[:3], pose[3:] = position, turned
@@ -90,7 +101,7 @@ class PlacedObstacle:
 
     def put(self, pose: Array, velocity: Array | None, time: float | None) -> float:
         """Go to a pose, seen from the model's origin; return how far a point goes at most [m]."""
-        way = _go(pose, self._pose, self._reach, self._ways)
+        way = _go(pose, self.pose, self._reach, self._ways)
         if way > 0.0:
             self.gone += way
             placement = pin.XYZQUATToSE3(pose)

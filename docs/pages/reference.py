@@ -12,7 +12,7 @@ _ALSO = {  # what public names take, return or hold, and nobody needs to import
     "control": ["control.disturbance_observer.ActuationParameters"],
     "certificates": ["certificates.certificate.Check", "certificates.task.Task"],
     "simulation": ["simulation.disturbances.Push"],
-    "scenarios": ["scenarios.scenario.ControlParameters", "scenarios.scenario.ControlForm"],
+    "scenarios": ["scenarios.control.ControlParameters", "scenarios.control.ControlForm"],
 }
 _ROOMS = {
     "arms": "an arm from its description, and poses of its frames",

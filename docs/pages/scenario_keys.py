@@ -78,7 +78,7 @@ def scenario_tables() -> dict[str, list[Key]]:
     return {
         "The file": [*_FILE.values(), *_keys(scenario.Scenario, plain - set(_FILE))],
         "[robot]": _keys(scenario._RobotTable, texts=_arguments_of_load_arm() | _ROBOT),
-        "[task]": _TASK,
+        "[task]": [*_TASK, *_keys(scenario.Scenario, {"goal_follows"})],
         **{f"[{x}]": _keys(kind, texts=own.get(x)) for x, kind in scenario.TABLES.items()},
         "pushes, of [disturbances]": _keys(Push),
         "[[obstacles]]": [

@@ -20,8 +20,9 @@ from densarm.density.navigation_density import (
     NavigationDensity,
     density_towards,
 )
+from densarm.scenarios.control import ControlForm
 from densarm.scenarios.run import run
-from densarm.scenarios.scenario import ControlForm, Scenario
+from densarm.scenarios.scenario import Scenario
 from densarm.scene.obstacles import Obstacle, Sphere
 from densarm.scene.scene import Scene
 from densarm.simulation.plants import PinocchioPlant

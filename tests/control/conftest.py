@@ -11,7 +11,8 @@ from densarm.control.regulation import DensityRegulation
 from densarm.control.tracking import DensityTracking
 from densarm.planning.motion import Motion
 from densarm.planning.plan import plan_motion
-from densarm.scenarios.scenario import ControlForm, Scenario
+from densarm.scenarios.control import ControlForm
+from densarm.scenarios.scenario import Scenario
 from densarm.scene.obstacles import Sphere
 from densarm.scene.scene import Scene
 from densarm.world.world import World

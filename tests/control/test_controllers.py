@@ -14,7 +14,8 @@ from densarm.control.controller import Controller
 from densarm.control.regulation import DensityRegulation
 from densarm.errors import InvalidValueError
 from densarm.planning.guide import GuidePath
-from densarm.scenarios.scenario import ControlForm, Scenario, load_scenario
+from densarm.scenarios.control import ControlForm
+from densarm.scenarios.scenario import Scenario, load_scenario
 from densarm.values.arrays import Array
 from densarm.world.active_pairs import ActivePairs
 from densarm.world.swept_check import SweptCheck

@@ -72,7 +72,7 @@ make = {
     "watching": lambda: Supervisor(arm, Still()),
     "trusting": lambda: Supervisor(arm, DensityTracking(world, motion), tolerances=None),
     "replanning": lambda: Replanning(
-        arm, goal, DensityTracking(world, motion), lambda q: None, 10.0, gains, 0.001
+        arm, goal, DensityTracking(world, motion), None, 10.0, gains, 0.001
     ),
 }
 NONE = [([0.0], [0.0]), (np.zeros((2, 2)), np.zeros((1, 2))), ([np.nan] * 4, [0.0, 0.0])]

@@ -15,8 +15,9 @@ from densarm.control.tracking import DensityTracking
 from densarm.errors import InvalidValueError
 from densarm.planning.motion import Motion
 from densarm.planning.plan import plan_motion
+from densarm.scenarios.control import ControlForm, ControlParameters
 from densarm.scenarios.run import run as run_scenario
-from densarm.scenarios.scenario import ControlForm, ControlParameters, Scenario
+from densarm.scenarios.scenario import Scenario
 from densarm.scene.motion import ConstantVelocity
 from densarm.scene.obstacles import Sphere
 from densarm.scene.scene import Scene

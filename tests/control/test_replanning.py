@@ -1,6 +1,6 @@
 """Plans that lose the arm: by a push, or by standing still; the new one begins at rest."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import numpy as np
@@ -8,11 +8,15 @@ import pytest
 
 from densarm.arms.arm import Arm, load_arm
 from densarm.control.controller import Controller, Gains
-from densarm.control.replanning import Replanning
+from densarm.control.replanning import PlanningInLoop, Replanning
 from densarm.control.supervisor import Supervisor
 from densarm.errors import InvalidValueError
-from densarm.planning.motion import Motion
+from densarm.planning.motion import Motion, PlanningError
+from densarm.scene.obstacles import Sphere
+from densarm.scene.scene import Scene
 from densarm.values.arrays import Array
+from densarm.values.outcome import Outcome
+from densarm.world.world import World
 
 PERIOD = 0.01
 
@@ -38,17 +42,30 @@ def arm() -> Arm:
     return load_arm("three_link")
 
 
+class Answers:
+    """A planner that has its answers; None for that there is no way."""
+
+    def __init__(self, answers: Iterator[Controller | None], late: float = 0.0) -> None:
+        self.answers, self.late = answers, late
+        self.asked, self.ready_at = list[Array](), 0.0
+
+    def ask(self, t: float, q: Array) -> None:
+        self.asked.append(q)
+        self.ready_at = t + self.late
+
+    def answer(self, t: float, _: Array) -> Controller | None:
+        if t < self.ready_at:
+            return None
+        if (found := next(self.answers)) is None:
+            raise PlanningError(Outcome.NO_PATH, "a wall")
+        return found
+
+
 def watched(
-    arm: Arm, first: Controller, answers: Iterator[Controller | None]
+    arm: Arm, first: Controller, answers: Iterator[Controller | None], late: float = 0.0
 ) -> tuple[Replanning, list[Array]]:
-    asked = []
-
-    def plan_again(q: Array) -> Controller | None:
-        asked.append(q)
-        return next(answers)
-
-    goal = arm.configuration([1.0, 0.0, 0.0])
-    return Replanning(arm, goal, first, plan_again, 0.5, Gains(), PERIOD), asked
+    goal, planner = arm.configuration([1.0, 0.0, 0.0]), Answers(answers, late)
+    return Replanning(arm, goal, first, planner, 0.5, Gains(), PERIOD), planner.asked
 
 
 def standing_motion(arm: Arm, seconds: float = 1.0) -> Motion:
@@ -91,6 +108,36 @@ def test_an_arm_that_gives_way_is_not_stopped_and_planned_for_where_it_stands(ar
     assert len(asked) == 2  # the first was in vain, and the arm went on
     assert len(first.times) + len(second.times) == 200
     assert controller.replanned_at == pytest.approx((1.3,), abs=3 * PERIOD)
+
+
+def test_the_loop_goes_on_while_a_plan_is_made_and_one_for_elsewhere_is_not_taken(arm: Arm) -> None:
+    first, second = (Recorder(arm, standing_motion(arm, 9.0)) for _ in range(2))
+    first.is_evading = True
+    controller, asked = watched(arm, first, iter([second, second]), late=0.3)
+    rest = np.zeros(arm.nv)
+    for k in range(200):
+        goes_on = 0.25 if k > 60 else 0.0
+        controller.torque(k * PERIOD, arm.configuration([0.4 + goes_on, 0.0, 0.0]), rest)
+    assert len(asked) == 2
+    assert controller.replanned_at == pytest.approx((0.6 + 0.6 + 0.3,), abs=0.15)
+    assert len(first.times) + len(second.times) == 200
+
+
+def test_planning_in_the_loop_sees_what_moves_where_it_will_be_and_takes_its_time(arm: Arm) -> None:
+    ball = Sphere(name="ball", radius=0.1, position=(2.0, 0.0, 0.0))
+    world, seen = World(arm, Scene([ball])), list[Scene]()
+    world.move_obstacle("ball", [1.5, 0.0, 0.0], velocity=[0.0, 0.0, 1.0])
+
+    def plan(predicted: World, _: Array) -> Callable[[Array], Controller]:
+        seen.append(predicted.scene)
+        return lambda _: Recorder(arm)
+
+    planner, q = PlanningInLoop(world, plan, 0.2), arm.configuration(np.zeros(arm.nv))
+    planner.ask(1.0, q)
+    assert planner.answer(1.19, q) is None
+    assert isinstance(planner.answer(1.2, q), Recorder)
+    assert seen[0].obstacles[0].position == pytest.approx([1.5, 0.0, 0.2])
+    assert world.scene.obstacles[0].position == pytest.approx([1.5, 0.0, 0.0])
 
 
 def test_arm_within_reach_of_its_motion_is_left_alone(arm: Arm) -> None:

@@ -1,6 +1,7 @@
 """DensityTracking: its one kernel is the law of its parts, whichever pairs are queried."""
 
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -25,8 +26,10 @@ from densarm.density.unsafe_sets import (
 )
 from densarm.errors import InvalidValueError
 from densarm.planning.motion import Motion
+from densarm.planning.plan import plan_motion
 from densarm.scenarios.scenario import Scenario
 from densarm.scene.scene import Scene
+from densarm.simulation.plants import PinocchioPlant
 from densarm.values.arrays import Array
 from densarm.world.active_pairs import ActivePairs
 from densarm.world.swept_check import SweptCheck
@@ -276,6 +279,43 @@ def test_it_goes_on_from_the_nearest_place_on_its_motion(
     controller.torque(7.0, q, np.zeros(arm.nv))
     assert controller.reference_time == pytest.approx(k * swing_up_motion.period, abs=2e-3)
     assert not controller.resume(arm.configuration(swing_up_motion.position[k] + 1.0), 0.05)
+
+
+# Following another motion.
+
+
+@pytest.mark.parametrize("at", [0.3, 0.6])
+def test_another_motion_is_joined_by_a_moving_arm_without_a_step_in_torque(
+    swing_up: Scenario, swing_up_motion: Motion, at: float
+) -> None:
+    arm, period = swing_up.arm, swing_up_motion.period
+    controller, plant = (
+        DensityTracking(swing_up.world, swing_up_motion),
+        PinocchioPlant(arm, period),
+    )
+    q, v, torques = swing_up.start, np.zeros(arm.nv), []
+    for k in range(4000):
+        if k == round(at / period):
+            back = plan_motion(swing_up.world, q, swing_up.start)
+            assert np.abs(v).max() > 1.0
+            controller.follow(back, q)
+            np.testing.assert_allclose(controller.goal, swing_up.start, atol=1e-12)
+        torques.append(controller.torque(k * period, q, v))
+        q, v = plant.step(q, v, torques[-1])
+    rate = np.abs(np.diff(torques, axis=0)) / period
+    assert (rate <= arm.limits.torque_rate * (1.0 + 1e-9)).all()
+    assert np.abs(arm.difference(q, swing_up.start)).max() < 1e-3
+
+
+def test_a_motion_of_another_period_or_margin_is_not_followed(
+    swing_up: Scenario, swing_up_motion: Motion
+) -> None:
+    controller = DensityTracking(swing_up.world, swing_up_motion)
+    slower, wider = replace(swing_up_motion, period=0.002), replace(swing_up_motion, margin=0.01)
+    for other, name, value in ((slower, "period", 0.002), (wider, "margin", 0.01)):
+        with pytest.raises(InvalidValueError, match=rf"{name} of the motion = {value}"):
+            controller.follow(other, swing_up.start)
+        assert controller.motion is swing_up_motion
 
 
 # Told as velocities.

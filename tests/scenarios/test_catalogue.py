@@ -8,8 +8,9 @@ from click.testing import CliRunner
 
 from densarm.arms.catalogue import scenario_paths
 from densarm.cli.list_known import list_known
+from densarm.scenarios.control import ControlForm
 from densarm.scenarios.run import run
-from densarm.scenarios.scenario import ControlForm, Scenario, load_scenario
+from densarm.scenarios.scenario import Scenario, load_scenario
 from densarm.simulation.run import Run
 from densarm.values.outcome import Outcome
 from densarm.world.swept_check import SweptCheck
@@ -44,7 +45,8 @@ def test_the_tasks_that_people_are_told_of_are_known() -> None:
 def test_scenario_has_a_title_obstacles_and_default_control(scenario: Scenario) -> None:
     assert scenario.title != scenario.name
     assert len(scenario.scene) > 0
-    assert scenario.control.form == ControlForm.TRACKING
+    follows = bool(scenario.goal_follows)
+    assert scenario.control.form == (ControlForm.REGULATION if follows else ControlForm.TRACKING)
     assert scenario.control.guide == ("direct" if "swing_up" in scenario.name else "auto")
 
 

@@ -11,8 +11,9 @@ from itertools import product
 import numpy as np
 import pytest
 
+from densarm.scenarios.control import ControlForm
 from densarm.scenarios.run import run
-from densarm.scenarios.scenario import ControlForm, Scenario, load_scenario
+from densarm.scenarios.scenario import Scenario, load_scenario
 from densarm.scene.scene import Scene
 from densarm.simulation.run import Run
 from densarm.values.outcome import Outcome

@@ -6,8 +6,9 @@ from pathlib import Path
 import pytest
 
 from densarm.errors import DensarmError
+from densarm.scenarios.control import ControlForm
 from densarm.scenarios.run import run
-from densarm.scenarios.scenario import ControlForm, Scenario, load_scenario
+from densarm.scenarios.scenario import Scenario, load_scenario
 from densarm.simulation.disturbances import Disturbances, Push
 from densarm.simulation.run import Run
 

@@ -17,8 +17,9 @@ from densarm.density.unsafe_sets import ClearanceSet
 from densarm.euclidean.density import EuclideanDensity
 from densarm.euclidean.implicit import Lowered, UnsafeRegion
 from densarm.planning.plan import plan_path
+from densarm.scenarios.control import ControlForm, ControlParameters
 from densarm.scenarios.run import run
-from densarm.scenarios.scenario import ControlForm, ControlParameters, Scenario
+from densarm.scenarios.scenario import Scenario
 from densarm.scene.obstacles import Box, Capsule, Sphere
 from densarm.scene.scene import Scene
 from densarm.simulation.plants import SingleIntegrator

@@ -20,8 +20,9 @@ from densarm.errors import InvalidValueError, UnknownNameError
 from densarm.planning.guide import GuidePath, NoPath
 from densarm.planning.motion import PlanningError
 from densarm.planning.plan import plan_motion
+from densarm.scenarios.control import ControlForm, ControlParameters
 from densarm.scenarios.run import Drive, by_density, records, run, run_by
-from densarm.scenarios.scenario import ControlForm, ControlParameters, Scenario, load_scenario
+from densarm.scenarios.scenario import Scenario, load_scenario
 from densarm.scene.obstacles import Box, Sphere
 from densarm.scene.scene import Scene
 from densarm.simulation.plants import PinocchioPlant

@@ -15,7 +15,8 @@ from densarm.control.controller import Gains
 from densarm.control.disturbance_observer import ActuationParameters
 from densarm.density.navigation_density import DensityParameters, Gauge
 from densarm.errors import DensarmError, FileContentError, InvalidValueError, UnknownNameError
-from densarm.scenarios.scenario import ControlForm, ControlParameters, Scenario, load_scenario
+from densarm.scenarios.control import ControlForm, ControlParameters
+from densarm.scenarios.scenario import Scenario, load_scenario
 from densarm.scene.obstacles import Sphere
 from densarm.scene.scene import Scene
 

@@ -14,8 +14,9 @@ from densarm.cli import main
 from densarm.density.navigation_density import DensityParameters, Gauge
 from densarm.errors import FileContentError, InvalidValueError
 from densarm.planning.motion import TimingParameters
+from densarm.scenarios.control import ControlForm
 from densarm.scenarios.run import records, run
-from densarm.scenarios.scenario import ControlForm, Scenario, load_scenario
+from densarm.scenarios.scenario import Scenario, load_scenario
 from densarm.simulation.run import Run
 from densarm.study.comparison import compare
 from densarm.values.outcome import Outcome
