@@ -30,7 +30,7 @@ def in_short(value: Any) -> str:
             return f"array of {'×'.join(map(str, value.shape))}"
         value = value.tolist()
     if isinstance(value, list | tuple) and all(isinstance(x, float | int) for x in value):
-        text = ", ".join(f"{x:.4g}" for x in value)
+        text = ", ".join(f"{round(x, 12) + 0.0:.4g}" for x in value)
         return f"({text})" if isinstance(value, tuple) else f"[{text}]"
     text = " ".join(repr(value).split())
     return text if len(text) <= _LONGEST else f"{text[: _LONGEST - 1]}…"
