@@ -103,7 +103,7 @@ class MissesAhead:
         for k, item in enumerate(self._world.geometry_model.geometryObjects):
             shape = item.geometry
             shape.computeLocalAABB()
-            self._radius[k] = shape.aabb_radius + np.linalg.norm(shape.aabb_center)
+            self._radius[k] = shape.aabb_radius + math.hypot(*shape.aabb_center)
 
 
 @compiled
