@@ -66,3 +66,40 @@ def test_unknown_name_is_an_attribute_error() -> None:
 def test_no_module_hides_a_public_name() -> None:
     modules = {module.name for module in pkgutil.iter_modules(densarm.__path__)}
     assert modules & set(densarm.__all__) == set()
+
+
+@pytest.mark.slow
+def test_reprs_are_short(swing_up_run: densarm.Run) -> None:
+    task, path = swing_up_run.task, densarm.GuidePath(swing_up_run.q[:2], is_clear=True)
+    arm, goal = task.arm, swing_up_run.q[-1]
+    world = densarm.World(arm, task.scene)
+    motion = densarm.Motion(0.1, arm.angles(swing_up_run.q), swing_up_run.v)
+    regulation = densarm.DensityRegulation(world, goal)
+    pose = densarm.Pose("tip", [0.0, 0.0, 1.0])
+    told = {
+        "Arm('two_link', 2 joints)": arm,
+        "Run('Swing a two-link arm from hanging to upright": swing_up_run,
+        "World(Arm('two_link', 2 joints), Scene(": world,
+        "Pose(frame='tip', position=(0, 0, 1))": pose,
+        "Certificate(proved: swept, start, goal": swing_up_run.certificate,
+        "DensityRegulation('two_link' to [": regulation,
+        "Supervisor('two_link' to [": densarm.Supervisor(arm, regulation),
+        "DensityTracking('two_link' to [": densarm.DensityTracking(world, motion),
+        "Motion(": motion,
+        "MotionSamples(": motion.samples(0.1),
+        "GuidePath(waypoints=array of 2×4, ": path,
+        "Scenario('swing_up', ": densarm.load_scenario("swing_up"),
+        "NavigationDensity(goal=[": densarm.density_towards(world, goal),
+        "TorusDistance(weights=[1, 1], kappa=1)": densarm.TorusDistance(arm),
+        "SingleIntegrator(Arm(": densarm.SingleIntegrator(arm),
+        "MujocoPlant(World(": densarm.MujocoPlant(world),
+        "ClearanceSample(": world.clearance(goal),
+        "Task(": task,
+    }
+    for start, value in told.items():
+        assert repr(value).startswith(start)
+        assert len(repr(value)) < 200
+    title, sentence, figures, proved = str(swing_up_run).splitlines()
+    assert (title, sentence) == (task.title, swing_up_run.outcome.description)
+    assert "clearance" in figures
+    assert proved == repr(swing_up_run.certificate)

@@ -98,6 +98,10 @@ class Arm:
         self.end_effector: str = self.model.frames[self.end_effector_frame].name
         self.postures: dict[str, Array] = self._postures()
 
+    def __repr__(self) -> str:
+        holding = "".join(f", holding {item.body.name}" for item in self.description.attachments)
+        return f"Arm({self.name!r}, {self.nv} joint{'s' * (self.nv != 1)}{holding})"
+
     @cached_property
     def visual_model(self) -> pin.GeometryModel:
         """Pinocchio's visual geometry, loaded when first asked for."""

@@ -14,6 +14,7 @@ from densarm.arms.urdf import Urdf, end_link
 from densarm.errors import InvalidValueError, RobotDescriptionError, UnknownNameError
 from densarm.values.arrays import Array
 from densarm.values.checks import finite_tuple, finite_vector, non_negative, positive
+from densarm.values.documented import documented
 
 DEFAULT_ACCELERATION = 10.0
 """Acceleration limit where nothing is known [rad/s² or m/s²]; a URDF carries none."""
@@ -25,6 +26,7 @@ _UNLIMITED = 1e12  # URDFs write huge numbers where a joint has no limit
 _LINK_MARK = " (link)"
 
 
+@documented
 @dataclass(frozen=True)
 class JointLimits:
     """Limits of the joints, each of shape (nv,); infinite where a joint has none."""

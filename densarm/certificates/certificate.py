@@ -55,6 +55,11 @@ class Certificate:
     checks: tuple[Check, ...]
     """One for each part."""
 
+    def __repr__(self) -> str:
+        failed = [check.name for check in self.checks if check.holds is False]
+        parts = failed or [check.name for check in self.checks if check.holds]
+        return f"Certificate({'not ' * (not self.certified)}proved: {', '.join(parts)})"
+
     @property
     def certified(self) -> bool:
         """Whether every part holds that applies."""

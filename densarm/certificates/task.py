@@ -152,6 +152,9 @@ class Task:
             v = finite_vector("start velocity", self.start_velocity, self.arm.nv)
             object.__setattr__(self, "start_velocity", v)
 
+    def __repr__(self) -> str:
+        return f"Task({self.title!r}, {self.arm}, {self.scene})"
+
     @property
     def large_meshes(self) -> dict[str, float]:
         """Longest side [m] of each mesh above 10 m, link or obstacle: perhaps its unit is wrong."""

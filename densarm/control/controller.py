@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from densarm.arms.arm import Arm
 from densarm.values.arrays import Array
 from densarm.values.checks import finite_vector, positive
-from densarm.values.documented import documented
+from densarm.values.documented import documented, in_short
 from densarm.values.kernels import compiled, entry_point
 
 _FLOAT = np.dtype(np.float64)
@@ -47,6 +47,17 @@ class VelocityController(Protocol):
     def velocity(self, t: float, q: ArrayLike, v: ArrayLike) -> Array:
         """Return the velocity to command (nv,) [rad/s or m/s]; else as `Controller.torque`."""
         ...
+
+
+class ToldByGoal:
+    """A controller whose `repr` names its arm and its goal."""
+
+    _arm: Arm
+
+    def __repr__(self) -> str:
+        goal = getattr(self, "goal", None)
+        shown = in_short(self._arm.angles(goal)) if isinstance(goal, np.ndarray) else str(goal)
+        return f"{type(self).__name__}({self._arm.name!r} to {shown})"
 
 
 @documented

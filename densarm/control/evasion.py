@@ -20,7 +20,7 @@ from densarm.density.inverse_bump import log_inverse_bump
 from densarm.values.arrays import Array
 from densarm.values.checks import non_negative, positive
 from densarm.values.documented import documented
-from densarm.values.kernels import compiled
+from densarm.values.kernels import compiled, entry_point
 from densarm.world.active_pairs import ActivePairs, pair_motion
 from densarm.world.distance_view import pair_rate
 from densarm.world.stopping import HELD_SHARE
@@ -137,22 +137,21 @@ class Evasion:
         self._now = pairs.state, pairs.rows, *slopes, world.twist, is_moving, pairs.reach
         self._density = np.array([margin, p.distance, p.decay, p.margin, p.reaction])
         self._most, self._none = HELD_SHARE * limits.acceleration, np.zeros(n)
-        self.is_needed()  # its kernel is loaded, or compiled, before a control loop
+        # Kernels are loaded, or compiled, before a control loop.
+        rows = self._now, self._density, self._none, self._limits, self._reaches, self._rows
+        self._density_rows = entry_point(_density_rows, *rows)
+        box = self._limits, self._rows, self._count, self._chosen
+        self._nearest = entry_point(_nearest, *(self._none,) * 3, *box, self._none)
+        moves = self._is_moving, world.has_motion, world.obstacle_way, self._way_before
+        self._moves = *moves, world.twist, self._ahead, pairs.reach
+        self._note_moving = entry_point(_note_moving, *self._moves)
 
     def is_needed(self) -> bool:
         """Return whether any obstacle moves, or was moved; pairs are awake in time from then on."""
         world = self._world
         if world.version != self._version:
             self._version = world.version
-            self._is_needed = _note_moving(
-                self._is_moving,
-                world.has_motion,
-                world.obstacle_way,
-                self._way_before,
-                world.twist,
-                self._ahead,
-                self._pairs.reach,
-            )
+            self._is_needed = self._note_moving(*self._moves)
         return self._is_needed
 
     @property
@@ -170,7 +169,7 @@ class Evasion:
         """
         angles, found = self._arm.angles(q), np.empty(self._arm.nv)
         self._write_rows(v, angles)
-        gives_way = _nearest(
+        gives_way = self._nearest(
             angles, v, nominal, self._limits, self._rows, self._count, self._chosen, found
         )
         return found, gives_way
@@ -188,7 +187,7 @@ class Evasion:
     def _write_rows(self, v: Array, angles: Array) -> None:
         """Write ∇h · q̇ ≥ b of all rows, [∇h, b] (nv + 1,), in blocks of the number of pairs."""
         horizon, limits = self.parameters.horizon, self._limits
-        self._count[0], self._count[-1] = _density_rows(
+        self._count[0], self._count[-1] = self._density_rows(
             self._now, self._density, v, limits, self._reaches, self._rows
         )
         self._looks = not self._looks and horizon > 0.0

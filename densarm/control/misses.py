@@ -7,7 +7,7 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from densarm.values.arrays import Array
-from densarm.values.kernels import compiled, compiled_part
+from densarm.values.kernels import compiled, compiled_part, entry_point
 from densarm.world.active_pairs import ActivePairs, pair_motion
 from densarm.world.distance_view import add_pair_gradient, shape_positions
 from densarm.world.pair_queries import PairQueries
@@ -57,6 +57,15 @@ class MissesAhead:
         self._near = np.zeros(world.n_pairs, np.int64)
         moves = world.lipschitz, world.twist, world.changes
         self._now = pairs.state, pairs.rows, is_moving, *moves
+        # Kernels are loaded, or compiled, before a control loop.
+        near, there = self._near, self._there
+        self._may_meet = entry_point(
+            _may_meet, self._now, there, there, limits, 0.0, 0.0, near, there
+        )
+        self._balls = self._bodies, world.pair_shapes, self._places, self._radius, world.twist
+        self._meet = entry_point(_meet, near, *self._balls, 0.0, 0.0)
+        rows = self._queries.rows, self._jacobian, world.sign, there, 0.0, 0.0
+        self._miss_rows = entry_point(_miss_rows, near, *rows, np.zeros((1, arm.nv + 1)))
 
     def write(self, angles: Array, v: Array, ahead: float, table: Array) -> int:
         """Write rows [∇h, b] (nv + 1,) for ∇h · q̇ ≥ b into a table, and return how many.
@@ -68,7 +77,9 @@ class MissesAhead:
             table: rows (at least K, nv + 1).
         """
         world, near, there, reach = self._world, self._near, self._there, self._miss + _REACH
-        n, turns, came = _may_meet(self._now, angles, v, self._limits, ahead, reach, near, there)
+        n, turns, came = self._may_meet(
+            self._now, angles, v, self._limits, ahead, reach, near, there
+        )
         if not n:
             return 0
         if came != self._came:
@@ -80,12 +91,11 @@ class MissesAhead:
         for shape, k in self._bodies.tolist() if turns else ():
             turn = pin.exp3(ahead * world.twist[k, 3:])
             data.oMg[shape].rotation = turn @ data.oMg[shape].rotation
-        balls = self._bodies, world.pair_shapes, self._places, self._radius, world.twist
-        n = _meet(near[:n], *balls, ahead, reach)
+        n = self._meet(near[:n], *self._balls, ahead, reach)
         self._queries.ask(near[:n])
         rows, soon = self._queries.rows, max(ahead - _LAG, _SOONEST)
         return int(
-            _miss_rows(near[:n], rows, self._jacobian, world.sign, v, self._miss, soon, table)
+            self._miss_rows(near[:n], rows, self._jacobian, world.sign, v, self._miss, soon, table)
         )
 
     def _measure(self) -> None:
@@ -93,7 +103,7 @@ class MissesAhead:
         for k, item in enumerate(self._world.geometry_model.geometryObjects):
             shape = item.geometry
             shape.computeLocalAABB()
-            self._radius[k] = shape.aabb_radius + np.linalg.norm(shape.aabb_center)
+            self._radius[k] = shape.aabb_radius + math.hypot(*shape.aabb_center)
 
 
 @compiled

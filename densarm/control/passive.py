@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from densarm.control.controller import Gains, checked_state
+from densarm.control.controller import Gains, ToldByGoal, checked_state
 from densarm.control.inverse_dynamics import InverseDynamics
 from densarm.control.stopping import StopAndHold
 from densarm.control.tracking import DensityTracking
@@ -30,7 +30,7 @@ _RETURN_SPEED, _RETURNED = 0.1, 1e-3  # [rad/s or m/s], and [rad or m] from wher
 _LATE = 1.5  # periods from one call to the next, after which the arm is at a start again
 
 
-class PassiveTracking:
+class PassiveTracking(ToldByGoal):
     r"""Tracks q_d(t) while nothing that moves could reach the arm before it has come to rest.
 
     From q̇ the arm comes to rest within the time T of its `StoppingTrajectory`; an obstacle of speed

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from densarm.arms.arm import Arm
 from densarm.arms.dynamics import Kinematics
 from densarm.arms.pose import Pose
-from densarm.control.controller import Gains, checked_state
+from densarm.control.controller import Gains, ToldByGoal, checked_state
 from densarm.control.disturbance_observer import FREE_INERTIA, ActuationParameters
 from densarm.control.evasion import Evasion
 from densarm.control.inverse_dynamics import (
@@ -59,7 +59,7 @@ class VelocityField(Protocol):
         ...
 
 
-class FieldRegulation:
+class FieldRegulation(ToldByGoal):
     r"""Regulate to the goal along a velocity field, without a reference in time.
 
     .. math:: \tau = H + M K_v (k(q) - \dot q) - \hat d

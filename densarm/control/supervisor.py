@@ -10,6 +10,7 @@ from densarm.arms.arm import Arm
 from densarm.control.controller import (
     Controller,
     Gains,
+    ToldByGoal,
     checked_state,
     is_plausible,
     takes_torque,
@@ -32,7 +33,7 @@ _LONGEST_PREDICTION = 0.25  # [s]
 _SLOW = 0.01  # [rad/s or m/s], which counts as rest
 
 
-class Supervisor:
+class Supervisor(ToldByGoal):
     """Passes on another controller's torque while all is well, and else stops the arm.
 
     All is well while the state is one, the dynamics explain how it came from the last one under
@@ -107,8 +108,7 @@ class Supervisor:
         self._patience = math.inf if patience is None else positive("patience", patience)
         self._rested, self._pauses = 0.0, False  # whether the controller itself stops it
         self._handed_over: InverseDynamics | None = None  # what it is to go on from
-        self._called = False  # whether it was, at this call
-        self._has_braked = False  # during this stop
+        self._called = self._has_braked = False  # at this call; during this stop
         self._course = self._course_of(controller)
         self._agreed_for: float | None = None  # the candidate, if there is one
         self._tau = np.zeros(arm.nv)

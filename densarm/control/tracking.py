@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from densarm.arms.dynamics import Kinematics
-from densarm.control.controller import Gains, checked_state
+from densarm.control.controller import Gains, ToldByGoal, checked_state
 from densarm.control.disturbance_observer import (
     AHEAD_ANGLE,
     AHEAD_VELOCITY,
@@ -66,7 +66,7 @@ TRACKING_GAINS = Gains(position=1400.0, velocity=80.0)
 """Of tracking, whose feedback no cap on accelerations weakens."""
 
 
-class DensityTracking:
+class DensityTracking(ToldByGoal):
     r"""Track q_d(t), obstacles acting at the true configuration.
 
     .. math::

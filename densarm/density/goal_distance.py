@@ -11,6 +11,7 @@ from densarm.arms.joint_space import joint_error
 from densarm.errors import InvalidValueError
 from densarm.values.arrays import Array
 from densarm.values.checks import finite_vector, positive_tuple
+from densarm.values.documented import in_short
 from densarm.values.kernels import compiled, compiled_part
 
 KAPPA_MIN = 1e-6
@@ -85,6 +86,9 @@ class TorusDistance:
         self.weights = joint_weights("weights", arm, weights)
         self.kappa = float(kappa)
         self._joint_index = arm.joint_index
+
+    def __repr__(self) -> str:
+        return f"TorusDistance(weights={in_short(self.weights)}, kappa={self.kappa:g})"
 
     def evaluate(self, q: Array, goal: Array, out_gradient: Array) -> float:
         """Act as `GoalDistance.evaluate`."""

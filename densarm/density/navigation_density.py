@@ -16,7 +16,7 @@ from densarm.density.unsafe_sets import Curved, SensingParameters, UnsafeSet, se
 from densarm.errors import InvalidValueError
 from densarm.values.arrays import Array
 from densarm.values.checks import non_negative, one_of, positive
-from densarm.values.documented import documented
+from densarm.values.documented import documented, in_short
 from densarm.values.kernels import compiled
 from densarm.world.world import World
 
@@ -193,6 +193,9 @@ class NavigationDensity:
         self.log_psi_gradient: Array = np.zeros(space.nv)
         self.goal_distance_value = 0.0
         self.goal_distance_gradient: Array = np.zeros(space.nv)
+
+    def __repr__(self) -> str:
+        return f"NavigationDensity(goal={in_short(self.goal)}, {self.parameters})"
 
     def set_goal(self, q: Array) -> None:
         """Move the goal to a configuration (nq,).

@@ -84,6 +84,7 @@ class NoPath:
     """As `GuidePath.remark`."""
 
 
+@documented
 @dataclass(frozen=True, eq=False)
 class PlannedPath:
     """A guide's answer, and what was kept from obstacles on the way."""

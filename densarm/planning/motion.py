@@ -12,7 +12,7 @@ from densarm.density.sub_goals import GuidePath
 from densarm.errors import DensarmError, InvalidValueError
 from densarm.values.arrays import Array
 from densarm.values.checks import positive
-from densarm.values.documented import documented
+from densarm.values.documented import documented, in_short
 from densarm.values.kernels import compiled, compiled_part
 from densarm.values.outcome import Outcome
 from densarm.world.tracking_tube import tracking_tube
@@ -70,6 +70,9 @@ class MotionSamples(NamedTuple):
     acceleration: Array
     """Joint accelerations (N, nv) [rad/s² or m/s²]."""
 
+    def __repr__(self) -> str:
+        return f"MotionSamples({len(self.time)} of {self.position.shape[1]} joints)"
+
     def joint_trajectory(self, joint_names: Sequence[str]) -> dict[str, Any]:
         """Return them as JSON data in the shape of ROS's trajectory_msgs/JointTrajectory."""
         points = []
@@ -111,6 +114,10 @@ class Motion:
     """Which critical points of ρ its curve left, and how; empty where it met none."""
     world: World | None = None
     """The arm among obstacles that it was planned for; None where nothing is known of them."""
+
+    def __repr__(self) -> str:
+        end = f"{self.duration:.3f} s to {in_short(self.position[-1])}"
+        return f"Motion({end}, margin={self.margin:g})"
 
     @cached_property
     def tube(self) -> Array | None:

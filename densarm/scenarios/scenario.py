@@ -136,6 +136,9 @@ class Scenario:
         may_blend = form in {ControlForm.REGULATION, ControlForm.PLAIN}
         require_smooth_goal(self.density, may_blend=may_blend, form=str(form))
 
+    def __repr__(self) -> str:
+        return f"Scenario({self.name!r}, {self.arm}, {self.scene})"
+
     def _require_goal_that_follows(self) -> None:
         name, form = self.goal_follows, self.control.form
         if name not in (obstacles := [item.name for item in self.scene]):

@@ -13,6 +13,7 @@ from densarm.values.checks import non_negative
 from densarm.values.documented import documented
 
 _Kind = TypeVar("_Kind", Obstacle, ObstacleMotion)
+_LONGEST = 80  # list of names that is told [characters]
 
 OBSTACLE_TYPES: Mapping[str, type[Obstacle]] = {
     "sphere": Sphere,
@@ -112,6 +113,11 @@ class Scene:
             if body.name in names:
                 raise InvalidValueError("obstacle name", body.name, "used only once in a scene")
             names.add(body.name)
+
+    def __repr__(self) -> str:
+        bodies = [*self.obstacles, *(item.body for item in self.attachments)]
+        names = ", ".join(body.name for body in bodies)
+        return f"Scene({names if len(names) <= _LONGEST else f'{len(bodies)} bodies'})"
 
     def __len__(self) -> int:
         return len(self.obstacles)

@@ -111,6 +111,9 @@ class MujocoPlant:
         if self._own:
             self._require_same_axes(names)
 
+    def __repr__(self) -> str:
+        return f"MujocoPlant({self._world}, dt={self.dt:g})"
+
     @classmethod
     def from_mjcf(
         cls,

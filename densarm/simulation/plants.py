@@ -194,6 +194,9 @@ class SingleIntegrator:
         self._deviation = np.sqrt(non_negative("noise", noise) * power)
         self._random = np.random.default_rng(seed)
 
+    def __repr__(self) -> str:
+        return f"SingleIntegrator({self._space}, dt={self.dt:g})"
+
     def step(self, q: Array, v: Array, u: Array) -> tuple[Array, Array]:
         """Return configurations and velocities one time step later, as `Plant.step`.
 

@@ -118,6 +118,24 @@ class Run:
             k = int(np.searchsorted(starts, row, side="right")) - 1
             yield (self.phases[k], row - int(starts[k])) if self.phases else (self, row)
 
+    def __repr__(self) -> str:
+        after = f"{self.outcome} after {self.time[-1]:.3f} s"
+        return f"Run({self.task.title!r}, {after}, {self._closest})"
+
+    def __str__(self) -> str:
+        after = f"{self.outcome.description} {self.detail}".rstrip()
+        figures = f"{self.time[-1]:.3f} s, {self._closest}, goal error {self.goal_error:.2g}"
+        return f"{self.task.title}\n{after}\n{figures}\n{self.certificate}"
+
+    def _repr_html_(self) -> str:
+        from densarm.visualization.notebook import run_in_notebook
+
+        return run_in_notebook(self)
+
+    @property
+    def _closest(self) -> str:
+        return f"clearance {1e3 * float(self.clearance.min()):.4g} mm"
+
     @classmethod
     def at_rest(cls, task: Task, world: World, outcome: Outcome, detail: str) -> "Run":
         """Return the run of an arm that did not move.

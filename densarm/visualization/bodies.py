@@ -1,6 +1,7 @@
 """Bodies: named surfaces that move with the joints of an arm."""
 
-from collections.abc import Sequence
+import re
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import product
@@ -74,6 +75,21 @@ def obstacle_bodies(scene: Scene, origin: ArrayLike = (0.0, 0.0, 0.0)) -> tuple[
         for obstacle in scene
         for item in geometry_objects(obstacle, origin=origin)
     )
+
+
+def spoken_names(arm: Arm, names: Iterable[str]) -> dict[str, str]:
+    """Return for names of bodies what a person would say: without a robot's own prefix, as words.
+
+    That is "link 4" for the shape ``j2s6s200_link_4_0``, and "left ball" for ``left_ball``.
+    """
+    shapes, frames = arm.collision_model.geometryObjects, arm.model.frames
+    links = {item.name: frames[item.parentFrame].name for item in shapes}
+    links = {shape: link for shape, link in links.items() if shape.startswith(f"{link}_")}
+    prefix = next(iter(links.values()), "").partition("_")[0] + "_"
+    if all(re.match(rf"{re.escape(prefix)}[a-zA-Z]", link) for link in links.values()):
+        links = {shape: link.removeprefix(prefix) for shape, link in links.items()}
+    spoken = {name: links.get(name, name).replace("_", " ") for name in names}
+    return {name: re.sub(r"(?<=[a-z])(?=\d)", " ", text) for name, text in spoken.items()}
 
 
 def sensing_bodies(obstacles: Sequence[Body], distance: float) -> tuple[Body, ...]:

@@ -18,7 +18,9 @@ import umsgpack
 from densarm.simulation.run import Run
 from densarm.values.files import atomic_file
 from densarm.visualization import palette
+from densarm.visualization.bodies import spoken_names
 from densarm.visualization.meshcat_drawing import draw
+from densarm.visualization.notebook import is_in_notebook, show_page
 from densarm.visualization.palette import css
 from densarm.visualization.render_scene import RenderScene, SummaryLine
 
@@ -30,6 +32,8 @@ _CHIPS = {True: "good", False: "bad", None: ""}  # classes of the page's style s
 def view(run: Run, on_url: Callable[[str], object] = print, *, open_browser: bool = True) -> None:
     """Show a run in the browser, with play, pause and a time line, until Ctrl-C.
 
+    In a notebook it is shown below the cell, which is done at once.
+
     Args:
         run: what to show.
         on_url: told the page's address.
@@ -38,7 +42,11 @@ def view(run: Run, on_url: Callable[[str], object] = print, *, open_browser: boo
     Raises:
         KeyboardInterrupt: on Ctrl-C.
     """
-    with PageServer(html_page(run)) as server:
+    page = html_page(run)
+    if is_in_notebook():
+        show_page(page)
+        return
+    with PageServer(page) as server:
         on_url(server.url)
         if open_browser:
             webbrowser.open(server.url)
@@ -91,10 +99,12 @@ def html_page(run: Run) -> str:
 
 
 def _closest(scene: RenderScene) -> dict[str, Any]:
+    found = {name for pair in scene.closest for name in pair.names}
+    spoken = spoken_names(scene.run.task.arm, found)
     return {
         "time": scene.time.round(_DECIMALS).tolist(),
         "distance": scene.clearance.round(_DECIMALS).tolist(),
-        "names": [pair.names for pair in scene.closest],
+        "names": [[spoken[name] for name in pair.names] for pair in scene.closest],
         "matrices": {  # column by column, as three.js has them
             name: transforms.transpose(0, 2, 1).reshape(-1, 16).round(_DECIMALS).tolist()
             for name, (_, transforms) in scene.closest_line.items()

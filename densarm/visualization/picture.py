@@ -35,6 +35,7 @@ _SUN = np.array([0.15, -0.1, 1.0])  # direction to the light that casts shadows
 
 _INSET = 24  # from the rim of a picture at a width of 1280 [pixels]
 _TITLE_SIZE = 23  # likewise
+_TAG_DISTANCE = 40  # likewise, of the clearance from the contact, across and up
 _BAR = (150, 8)  # width and height of the colour scale at a width of 1280 [pixels]
 
 
@@ -52,9 +53,14 @@ def save_picture(run: Run, path: str | Path) -> None:
         FileContentError: the file cannot be written.
     """
     with _picture_file(path, ".png") as file:
-        scene = RenderScene(run)
-        k = int(np.argmin(scene.clearance)) if scene.closest else len(scene.time) // 2
-        Picture(scene, *_STILL_SIZE).frame(k).save(file, format="PNG")
+        still(run, *_STILL_SIZE).save(file, format="PNG")
+
+
+def still(run: Run, width: int, height: int) -> Image.Image:
+    """Return a picture of a width and height [pixels] of a run where it is closest to collision."""
+    scene = RenderScene(run)
+    k = int(np.argmin(scene.clearance)) if scene.closest else len(scene.time) // 2
+    return Picture(scene, width, height).frame(k)
 
 
 def save_animation(run: Run, path: str | Path) -> None:
@@ -268,13 +274,17 @@ class Caption:
         pen.rectangle((*bar[:2], share * self._width, bar[3]), palette.css(palette.GOOD))
 
     def _write_distance(self, pen: ImageDraw.ImageDraw, k: int, end: tuple[float, float]) -> None:
-        words = f"{self._scene.clearance[k] * 1e3:.1f} mm"
-        at = (end[0] + self._at(12), end[1] - self._at(18))
-        box = pen.textbbox(at, words, self._text_font, anchor="lm")
-        inset = self._at(4)
+        words, ink = f"{self._scene.clearance[k] * 1e3:.1f} mm", palette.css(palette.CLOSEST)
+        inset, away = self._at(4), self._at(_TAG_DISTANCE)
+        needs = away + pen.textlength(words, self._text_font) + 2 * inset
+        side = 1 if end[0] + needs < self._width else -1  # beside the contact, inside the picture
+        at = (end[0] + side * away, end[1] - away)
+        anchor = "lm" if side > 0 else "rm"
+        box = pen.textbbox(at, words, self._text_font, anchor=anchor)
         around = (box[0] - inset, box[1] - inset, box[2] + inset, box[3] + inset)
+        pen.line((*end, *at), ink, max(1, self._at(1.3)))
         pen.rounded_rectangle(around, inset, "white")
-        pen.text(at, words, palette.css(palette.CLOSEST), self._text_font, anchor="lm")
+        pen.text(at, words, ink, self._text_font, anchor=anchor)
 
     def _font(self, name: str, size: float) -> ImageFont.FreeTypeFont:
         return ImageFont.truetype(str(_font_folder() / name), self._at(size))

@@ -168,7 +168,7 @@ def _plot_clearance(axes: Axes, run: Run) -> None:
     k = int(np.argmin(clearance))
     axes.plot(run.time[k], clearance[k], "o", color=VERMILION, markersize=4)
     words = f"smallest {clearance[k]:.4g} mm at {run.time[k]:.2f} s, margin {margin:g} mm"
-    axes.set_title(words, loc="right")
+    axes.set_title(words, loc="left")
     top = max(min(clearance.max(), _HIGHEST), 2.0 * clearance[k], 2.0 * margin)
     axes.set_ylim(min(-0.08 * top, 1.1 * clearance[k]), 1.05 * top)
     axes.axhspan(axes.get_ylim()[0], margin, color=VERMILION, alpha=0.18, linewidth=0.0)
@@ -185,7 +185,7 @@ def _plot_density(axes: Axes, run: Run, world: World, density: NavigationDensity
     axes.plot(run.time[rows], shown, color=BLACK, linewidth=1.3)
     axes.set_ylabel("ln ρ")
     sensed = f"{run.task.sensing.distance * 1e3:g} mm"
-    axes.set_title(f"density to the goal, obstacles sensed within {sensed}", loc="right")
+    axes.set_title(f"density to the goal, obstacles sensed within {sensed}", loc="left")
     axes.grid(alpha=0.3)
 
 

@@ -123,6 +123,9 @@ class World(ChangingObstacles):
             self.remove_obstacle(obstacle.name)
         self._is_spare = np.zeros(self.n_pairs, bool)
 
+    def __repr__(self) -> str:
+        return f"World({self.arm}, {self.scene}, {self.n_pairs} pairs)"
+
     def clearance(self, q: ArrayLike) -> ClearanceSample:
         """Return the distances of all pairs and their gradients.
 

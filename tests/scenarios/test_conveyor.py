@@ -3,6 +3,7 @@
 import json
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -72,11 +73,12 @@ def test_the_goal_keeps_to_an_obstacle_that_is_moved_and_turned(conveyor: Scenar
 
 def test_what_no_goal_can_keep_to_is_refused_in_one_line(conveyor: Scenario) -> None:
     tracking = ControlParameters(form=ControlForm.TRACKING)
-    for change, told in (
+    refused: list[tuple[dict[str, Any], str]] = [
         ({"goal_follows": "prat"}, r"goal_follows.*'prat'.*did you mean 'part'"),
         ({"control": tracking}, r"control.form = 'tracking'.*'regulation' where the goal follows"),
         ({"goal": conveyor.goal, "goals": ()}, r"goal_follows = 'part'.*goal is no pose"),
-    ):
+    ]
+    for change, told in refused:
         with pytest.raises(DensarmError, match=told) as raised:
             replace(conveyor, **change)
         assert "\n" not in str(raised.value)

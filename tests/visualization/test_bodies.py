@@ -5,11 +5,17 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from densarm.arms.arm import Arm
+from densarm.arms.arm import Arm, load_arm
 from densarm.scene.mesh import Mesh
 from densarm.scene.obstacles import HalfSpace, Sphere
 from densarm.scene.scene import Attachment, Scene
-from densarm.visualization.bodies import WORLD, arm_bodies, obstacle_bodies, sensing_bodies
+from densarm.visualization.bodies import (
+    WORLD,
+    arm_bodies,
+    obstacle_bodies,
+    sensing_bodies,
+    spoken_names,
+)
 
 TETRAHEDRON = ((0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
@@ -40,3 +46,29 @@ def test_held_body_moves_with_its_link(two_link: Arm) -> None:
     pin.forwardKinematics(arm.model, arm.data, arm.configuration([np.pi / 2, 0.0]))
     middle = held.corners(list(arm.data.oMi)).mean(axis=0)
     np.testing.assert_allclose(middle, [1.5, 0.0, 0.0], atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("robot", "name", "spoken"),
+    [
+        ("kinova", "j2s6s200_link_4_0", "link 4"),
+        ("panda", "panda_link5_0", "link 5"),
+        ("panda", "panda_leftfinger_3", "leftfinger"),
+        ("ur5", "wrist_1_link_0", "wrist 1 link"),
+        ("ur5", "forearm_link_0.3", "forearm link"),
+        ("xarm7", "link4_0.2", "link 4"),
+        ("two_link", "upper_link_0", "upper link"),
+        ("two_link", "left_ball", "left ball"),
+    ],
+)
+def test_names_are_those_that_a_person_would_say(robot: str, name: str, spoken: str) -> None:
+    assert spoken_names(load_arm(robot), [name]) == {name: spoken}
+
+
+def test_held_bodies_keep_their_names() -> None:
+    bar = Sphere(name="bar_0", radius=0.01)
+    arm = load_arm("panda").holding(Attachment(bar, link="panda_hand"))
+    assert spoken_names(arm, ["bar_0", "panda_hand_0"]) == {
+        "bar_0": "bar 0",
+        "panda_hand_0": "hand",
+    }

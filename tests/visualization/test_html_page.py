@@ -68,7 +68,7 @@ def test_time_line_moves_the_arm_and_the_closest_pair(page: Any, swing: Run) -> 
     millimetres = f"{1e3 * np.interp(2.0, swing.time, swing.clearance):.1f} mm"
     assert page.evaluate("label.textContent") == millimetres
     words = page.evaluate("document.getElementById('closest').textContent")
-    assert words.startswith("closest: lower_link_0 and ")
+    assert words.startswith("closest: lower link and ")
     assert words.endswith(millimetres)
 
 

@@ -14,7 +14,7 @@ from densarm.simulation.run import Run
 from densarm.values.arrays import Array
 from densarm.visualization import palette
 from densarm.visualization import picture as module
-from densarm.visualization.picture import Picture, save_animation, save_picture
+from densarm.visualization.picture import Caption, Picture, save_animation, save_picture
 from densarm.visualization.render_scene import RenderScene
 
 SIZE = (320, 180)
@@ -57,6 +57,19 @@ def test_without_a_goal_there_is_no_ghost(swing: Run, aimless: Run) -> None:
     with_goal.camera, with_goal.floor = scene.camera, scene.floor
     assert differing(Picture(with_goal, *SIZE).frame(0), without[0]) > 100
     assert differing(Picture(with_goal, *SIZE).frame(last), without[1]) < 10
+
+
+@pytest.mark.parametrize("x", [600, 1270])
+def test_clearance_is_told_beside_the_contact_and_inside_the_picture(swing: Run, x: int) -> None:
+    size, end = (1280, 720), (x, 300)
+    image = Image.new("RGB", size, "black")
+    Caption(RenderScene(swing), *size).write(image, 0, end)
+    white = (np.asarray(image)[200:400] == 255).all(axis=2)
+    rows, columns = np.nonzero(white)
+    assert len(rows) > 200
+    assert np.hypot(rows + 200 - end[1], columns - x).min() > 30  # [pixels]
+    assert columns.min() > 0
+    assert columns.max() < size[0] - 1
 
 
 def test_still_is_a_png_of_full_size(swing: Run, tmp_path: Path) -> None:

@@ -78,7 +78,7 @@ def test_panels_show_the_record(run: Run, figure: Figure) -> None:
     assert y_of(position.get_lines()[0])[50] == pytest.approx(2.0 * np.sin(1.5))
     (clearance,) = axes_of(figure, "clearance [mm]")
     assert y_of(clearance.get_lines()[0]) == pytest.approx(1e3 * run.clearance)
-    assert "smallest 12 mm at 0.00 s" in clearance.get_title(loc="right")
+    assert "smallest 12 mm at 0.00 s" in clearance.get_title(loc="left")
 
 
 def test_limits_are_in_sight_whatever_the_values_are(run: Run, figure: Figure) -> None:
