@@ -11,7 +11,7 @@ from types import ModuleType
 import pytest
 
 import densarm
-from densarm.scenarios import scenario
+from densarm.scenarios import scenario, steps
 from densarm.scene.motion import MOTION_TYPES
 from densarm.scene.scene import OBSTACLE_TYPES
 
@@ -54,6 +54,8 @@ def test_every_key_is_told() -> None:
     parsed = {**scenario.TABLES, "robot": scenario._RobotTable, "task": scenario._TaskTable}
     for table, kind in parsed.items():
         assert names(f"[{table}]") == {field.name for field in fields(kind)}
+    assert names("[[steps]]") == set(steps._KEYS)
+    assert names("line, of [[steps]]") == {field.name for field in fields(steps._LineTable)}
     for word, kind in OBSTACLE_TYPES.items():
         own = names(f'type = "{word}"') | names("[[obstacles]]") - {"type"}
         assert own == {field.name for field in fields(kind)}

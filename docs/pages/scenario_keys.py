@@ -11,9 +11,11 @@ from typing import Any, NamedTuple, get_args, get_origin, get_type_hints
 import numpy as np
 
 from densarm.arms.arm import load_arm
+from densarm.arms.line import Line
 from densarm.arms.pose import Pose
 from densarm.control.tracking import TRACKING_GAINS
 from densarm.scenarios import scenario
+from densarm.scenarios.steps import Attach, Detach
 from densarm.scene.motion import MOTION_TYPES
 from densarm.scene.obstacles import Obstacle
 from densarm.scene.scene import OBSTACLE_TYPES, Attachment
@@ -57,8 +59,17 @@ _TASK = [
         "goal",
         "the same or a table",
         "required",
-        "The same, or [a pose](#a-pose), or a list of these, of which any will do.",
+        "The same, or [a pose](#a-pose), or a list of these, of which any will do. Left out where "
+        "there are [steps](tasks.md).",
     ),
+]
+_STEPS = [  # one of them in each table
+    Key("move_to", "as a goal", "–", "Where to go, as [task] goal."),
+    Key("line", "table", "–", "A straight way of a frame, below."),
+    Key("grip", "table", "–", "Position of each joint of a gripper [rad or m], by its name."),
+    Key("attach", "table", "–", "A body that is taken, below."),
+    Key("detach", "text or table", "–", "A body that is put down: its name, or as below."),
+    Key("wait", "number", "–", "How long to rest [s]."),
 ]
 _GAINS = {
     name: f"{dict(field_docs(type(TRACKING_GAINS)))[name][:-1]}; {value:g} in tracking."
@@ -74,7 +85,14 @@ def scenario_tables() -> dict[str, list[Key]]:
     """Return the keys of every table, by the heading that the page gives it."""
     plain = scenario._KEYS - set(scenario.TABLES)
     own = {"gains": _GAINS}
-    every, held = [field.name for field in fields(Obstacle)], ("touch_links", "mass")
+    every, held = (
+        [field.name for field in fields(Obstacle)],
+        (
+            "touch_links",
+            "mass",
+            "touch_obstacles",
+        ),
+    )
     return {
         "The file": [*_FILE.values(), *_keys(scenario.Scenario, plain - set(_FILE))],
         "[robot]": _keys(scenario._RobotTable, texts=_arguments_of_load_arm() | _ROBOT),
@@ -94,6 +112,10 @@ def scenario_tables() -> dict[str, list[Key]]:
             *_keys(Attachment, held),
         ],
         **{f'motion = {{ type = "{x}" }}': _keys(kind) for x, kind in MOTION_TYPES.items()},
+        "[[steps]]": _STEPS,
+        "line, of [[steps]]": _keys(Line),
+        "attach, of [[steps]]": _keys(Attach),
+        "detach, of [[steps]]": _keys(Detach),
         "A pose": [*_keys(Pose), Key("orientation_rpy_deg", "numbers", "–", _DEGREES)],
     }
 
