@@ -6,10 +6,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from densarm.control.disturbance_observer import AHEAD_VELOCITY
+from densarm.control.disturbance_observer import AHEAD_VELOCITY, DISTURBANCE, FREE
 from densarm.control.inverse_dynamics import (
     ATTRACT,
     BRAKE,
+    EFFORT_LIMIT,
+    RATE_LIMIT,
+    TORQUE,
     DynamicsArrays,
     InverseDynamics,
     straight_torque,
@@ -19,8 +22,9 @@ from densarm.control.soft_rows import nearest_in_box
 from densarm.density.inverse_bump import log_inverse_bump
 from densarm.values.arrays import Array
 from densarm.values.checks import non_negative, positive
+from densarm.values.cholesky import factorise, solve_factorised
 from densarm.values.documented import documented
-from densarm.values.kernels import compiled, entry_point
+from densarm.values.kernels import compiled, compiled_part, entry_point
 from densarm.world.active_pairs import ActivePairs, pair_motion
 from densarm.world.distance_view import pair_rate
 from densarm.world.stopping import HELD_SHARE
@@ -36,6 +40,7 @@ _RECOVERY = 4.0  # [1/s] of a margin that is lost, and at which the way to a joi
 _STANDING_RATE = 10.0  # [1/s] at which the distance to what stands may shrink
 _BRAKE_SHARE = 0.5  # of the accelerations, that a stop before what stands reckons with
 _REACH_SHARE = 1.1  # of what accelerations reach, since reach is of the next step
+_KEPT = 1.0 + 1e-6  # of accelerations asked for, which rounding may exceed
 _WEIGHT = 1e4  # of a row's lack [rad or m]
 _FIRMNESS = 30.0  # of rows of what stands, as if they lacked so many times as much
 _LEAST_SHARE = 1e-5  # of σ, of h where the bump is evaluated
@@ -267,6 +272,49 @@ def _send(arrays: DynamicsArrays, wanted: Array, ahead: Array, most: Array) -> N
         a = EVADING_GAIN * (wanted[i] - rows[AHEAD_VELOCITY, i]) + ahead[i]
         rows[ATTRACT, i], rows[BRAKE, i] = min(max(a, -most[i]), most[i]), 0.0
     straight_torque(arrays)
+    _keep_accelerations(arrays, most)
+
+
+@compiled_part
+def _keep_accelerations(arrays: DynamicsArrays, most: Array) -> None:
+    """Change the torque within its rate so that accelerations keep their limits, if they can.
+
+    What was sent before leads elsewhere by now: where the rate binds, not all that is between that
+    and a torque that is allowed is allowed as well.
+    """
+    mass, nonlinear, gravity, rows, sent = arrays[:5]
+    n, fastest = most.size, 0.0
+    factor, a, offset = np.empty((n, n)), np.empty(n), np.empty(n)
+    factorise(mass, factor)
+    for i in range(n):
+        offset[i] = nonlinear[i] - rows[DISTURBANCE, i]
+        a[i] = rows[TORQUE, i] - offset[i]
+    solve_factorised(factor, a)
+    for i in range(n):
+        fastest = max(fastest, abs(a[i]) / most[i])
+    if fastest <= _KEPT:
+        return
+    table, least, low, high = np.empty((2 * n, n)), np.empty(2 * n), np.empty(n), np.empty(n)
+    for i in range(n):
+        row = table[i]
+        row[:] = 0.0
+        row[i] = 1.0
+        solve_factorised(factor, row)  # of the inverse of M
+        length, still = 0.0, 0.0
+        for j in range(n):
+            length += row[j] * row[j]
+            still += row[j] * offset[j]
+        length = math.sqrt(length)
+        least[i], least[n + i] = (still - most[i]) / length, -(still + most[i]) / length
+        for j in range(n):
+            row[j] /= length
+            table[n + i, j] = -row[j]
+        before, limit = rows[FREE, i] + gravity[i], rows[EFFORT_LIMIT, i]
+        low[i] = max(-limit, before - rows[RATE_LIMIT, i])
+        high[i] = max(low[i], min(limit, before + rows[RATE_LIMIT, i]))
+    nearest_in_box(rows[TORQUE].copy(), table, least, low, high, _WEIGHT, a)
+    for i in range(n):
+        rows[TORQUE, i] = sent[-1, i] = a[i]
 
 
 @compiled
