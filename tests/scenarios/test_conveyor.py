@@ -35,7 +35,7 @@ def test_the_part_is_followed_and_the_run_is_certified(conveyor: Scenario, done:
     off = []
     for k in range(2500, 4000, 50):  # [ms], while the part moves and the arm has caught up
         x, y, z = conveyor.arm.pose(done.q[k], "tool0").position
-        off.append(np.hypot(x - 0.5, y + 0.4 - 0.2 * done.time[k]) + abs(z - 0.2))
+        off.append(np.hypot(x - 0.5, y + 0.4 - 0.2 * done.time[k]) + abs(z - 0.23))
     assert max(off) <= 2e-3
     rate = np.abs(np.diff(done.tau[:-1], axis=0)) / 0.001
     assert (rate <= conveyor.arm.limits.torque_rate * (1.0 + 1e-9)).all()
@@ -63,11 +63,11 @@ def test_the_goal_keeps_to_an_obstacle_that_is_moved_and_turned(conveyor: Scenar
     turned = [0.0, 0.0, half, half]
     world.move_obstacle("part", [0.4, -0.3, 0.1], turned, velocity=[0.1, 0, 0, 0, 0, 1.0])
     follower.torque(0.0, conveyor.start, rest)
-    np.testing.assert_allclose(follower.goal.position, [0.4, -0.3, 0.2], atol=1e-12)
+    np.testing.assert_allclose(follower.goal.position, [0.4, -0.3, 0.23], atol=1e-12)
     x_axis = follower.goal.placement.rotation[:, 0]
     np.testing.assert_allclose(np.abs(x_axis), [0.0, 1.0, 0.0], atol=1e-9)
     assert follower.is_moving
-    off = np.subtract(conveyor.arm.pose(conveyor.start, "tool0").position, [0.4, -0.3, 0.2])
+    off = np.subtract(conveyor.arm.pose(conveyor.start, "tool0").position, [0.4, -0.3, 0.23])
     assert follower.lag == pytest.approx(np.linalg.norm(off))
 
 
