@@ -17,6 +17,10 @@ Chunk = TypeVar("Chunk")
 Result = TypeVar("Result")
 
 _CONNECTING = 3.0  # [s]
+_SETTINGS = {
+    "distributed.worker.profile.enabled": False,  # which looks every 10 ms at what runs
+    "distributed.admin.large-graph-warning-threshold": "1GB",  # z1_window's meshes have 16 MB
+}
 
 
 def as_completed(
@@ -49,7 +53,10 @@ def as_completed(
         yield from map(work, chunks)
         return
     distributed = _require_dask(f"jobs = {jobs}" if scheduler is None else "scheduler")
+    import dask
+
     with ExitStack() as stack:
+        stack.enter_context(dask.config.set(_SETTINGS))
         if scheduler is None:
             has_dashboard = find_spec("bokeh") is not None
             cluster = distributed.LocalCluster(

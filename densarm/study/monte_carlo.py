@@ -32,8 +32,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-_CHUNK = 8  # runs, at most: what a worker that dies takes with it
-_CHUNKS = 16  # at least, where there are runs enough
+_CHUNK = 8  # runs: what a worker that dies takes with it
+_FEWEST, _MOST = 16, 2000  # chunks: for progress in small studies, and what a scheduler can do
 _SAVING = 0.02  # share of the time that saving may take
 _DETAIL = 120  # characters that are kept
 
@@ -186,7 +186,7 @@ def run_study(
         rows[: len(kept)] = kept
     study.case(0)  # what is wrong with all of them is told at once
     missing = np.flatnonzero(rows["outcome"] == "")
-    size = min(_CHUNK, -(-len(missing) // _CHUNKS)) or 1
+    size = min(max(_CHUNK, len(missing) // _MOST), -(-len(missing) // _FEWEST)) or 1
     chunks = [missing[k : k + size] for k in range(0, len(missing), size)]
     workers, began, saved, spent = [""], time.perf_counter(), time.perf_counter(), 0.0
 

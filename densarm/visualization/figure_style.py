@@ -21,7 +21,7 @@ PURPLE, SKY, GREY, BLACK = "#CC79A7", "#56B4E9", "#8C8C8C", "#000000"
 DENSITY_MAP = "viridis"
 """Colour map of densities: even in lightness, so it survives grey print."""
 
-OUTCOME_COLOUR = {
+OUTCOME_COLOUR: dict[str, str] = {
     Outcome.REACHED: BLUE,
     Outcome.STUCK: ORANGE,
     Outcome.COLLIDED: VERMILION,
