@@ -4,7 +4,7 @@ import asyncio
 import logging
 import pickle
 import signal
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterator, Sequence
 from contextlib import ExitStack
 from importlib.util import find_spec
 from threading import Lock
@@ -29,7 +29,7 @@ def as_completed(
     jobs: int = 1,
     scheduler: str | None = None,
     on_workers: Callable[[str], None] = lambda _: None,
-) -> Iterator[Result]:
+) -> Generator[Result, None, None]:
     """Do the same work on many chunks, and yield what comes of each as it comes, in any order.
 
     A chunk whose worker dies is done again by another; one at which three more die is left, and

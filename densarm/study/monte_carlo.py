@@ -4,6 +4,7 @@ import json
 import time
 import zlib
 from collections.abc import Callable, Mapping
+from contextlib import closing
 from dataclasses import dataclass, field, fields, replace
 from difflib import get_close_matches
 from functools import cache, partial
@@ -202,15 +203,16 @@ def run_study(
     count = 0
     tell(count)
     try:
-        for indices, found in as_completed(partial(_run, study), chunks, jobs, scheduler, who):
-            rows[indices] = found
-            count += len(indices)
-            tell(count)
-            if save is not None and time.perf_counter() - saved >= spent / _SAVING:
-                begin = time.perf_counter()
-                _save(save, study, rows)
-                saved = time.perf_counter()
-                spent = saved - begin
+        with closing(as_completed(partial(_run, study), chunks, jobs, scheduler, who)) as results:
+            for indices, found in results:
+                rows[indices] = found
+                count += len(indices)
+                tell(count)
+                if save is not None and time.perf_counter() - saved >= spent / _SAVING:
+                    begin = time.perf_counter()
+                    _save(save, study, rows)
+                    saved = time.perf_counter()
+                    spent = saved - begin
     finally:
         if save is not None and count:
             _save(save, study, rows)
