@@ -8,10 +8,10 @@ Each file is a cell; a panel holds those that differ in speed alone. Bars are in
 
 import argparse
 import json
-import math
 from pathlib import Path
 from typing import Any
 
+from densarm.values.proportion import Proportion
 from densarm.visualization.figure_style import (
     BLUE,
     GREEN,
@@ -33,15 +33,6 @@ COLOURS = {
     "passive": PURPLE,
     "density_near": SKY,
 }
-_Z = 1.96
-
-
-def wilson(count: int, total: int) -> tuple[float, float]:
-    """Return Wilson's 95 % interval of a share, from how many of a total were counted."""
-    share, z = count / total, _Z**2 / total
-    middle = (share + 0.5 * z) / (1.0 + z)
-    half = math.sqrt(share * (1.0 - share) * z + 0.25 * z * z) / (1.0 + z)
-    return middle - half, middle + half
 
 
 def _panel(cell: dict[str, Any]) -> str:
@@ -69,7 +60,7 @@ def main(arguments: list[str] | None = None) -> None:
             speeds = [data["cell"]["speed"] + 0.015 * (k - len(methods) // 2) for data in some]
             counts = [data["methods"][method] for data in some]
             shares = [100.0 * each["contacts"] / each["trials"] for each in counts]
-            ends = [wilson(each["contacts"], each["trials"]) for each in counts]
+            ends = [Proportion(each["contacts"], each["trials"]).interval for each in counts]
             low = [max(x - 100.0 * end[0], 0.0) for x, end in zip(shares, ends, strict=True)]
             high = [max(100.0 * end[1] - x, 0.0) for x, end in zip(shares, ends, strict=True)]
             drawn[method] = axes.errorbar(

@@ -55,6 +55,7 @@ def application() -> "click.Group":
     from densarm.cli.plan import plan
     from densarm.cli.recorded import verify, view
     from densarm.cli.run import run
+    from densarm.cli.study import study
 
     @click.group("densarm", context_settings={"help_option_names": ["-h", "--help"]})
     @click.version_option(densarm.__version__, message="%(version)s")
@@ -73,7 +74,7 @@ def application() -> "click.Group":
           130  interrupted by Ctrl-C
         """  # noqa: D301
 
-    for command in (list_known, run, plan, view, verify, bench, compare):
+    for command in (list_known, run, plan, view, verify, study, bench, compare):
         group.add_command(command)
     return group
 

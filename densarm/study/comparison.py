@@ -274,9 +274,8 @@ def comparison_figure(comparison: Comparison) -> "Figure":
     # Matplotlib takes a second to import.
     from matplotlib.ticker import MaxNLocator
 
-    from densarm.visualization.figure_style import BLACK, BLUE, GREY, OUTCOME_COLOUR, new_figure
+    from densarm.visualization.figure_style import BLACK, BLUE, END_COLOUR, new_figure
 
-    colours = {FAILED: BLACK, **{str(end): colour for end, colour in OUTCOME_COLOUR.items()}}
     results, rows = comparison.baselines, range(len(comparison.baselines))
     figure = new_figure(10.0, 2.4 + 0.55 * len(rows))
     figure.suptitle(
@@ -288,8 +287,8 @@ def comparison_figure(comparison: Comparison) -> "Figure":
     for outcome in RUN_ENDS:
         counts = np.array([result.count(outcome) for result in results])
         if counts.any():
-            colour = colours.get(outcome, GREY)
-            outcomes.barh(rows, counts, left=left, height=0.6, color=colour, label=outcome)
+            bars = {"color": END_COLOUR[outcome], "label": outcome}
+            outcomes.barh(rows, counts, left=left, height=0.6, **bars)
             left += counts
     outcomes.set_xlim(0, comparison.starts)
     outcomes.set_xlabel("runs")

@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from densarm.errors import InvalidValueError
 from densarm.values.arrays import Array
 from densarm.values.files import atomic_file
-from densarm.values.outcome import Outcome
+from densarm.values.outcome import FAILED, Outcome
 
 # M. Okabe, K. Ito, Color Universal Design, 2008: told apart by colour-blind readers.
 BLUE, ORANGE, GREEN, VERMILION = "#0072B2", "#E69F00", "#009E73", "#D55E00"
@@ -21,13 +21,15 @@ PURPLE, SKY, GREY, BLACK = "#CC79A7", "#56B4E9", "#8C8C8C", "#000000"
 DENSITY_MAP = "viridis"
 """Colour map of densities: even in lightness, so it survives grey print."""
 
-OUTCOME_COLOUR = {
+OUTCOME_COLOUR: dict[str, str] = {
     Outcome.REACHED: BLUE,
     Outcome.STUCK: ORANGE,
     Outcome.COLLIDED: VERMILION,
     Outcome.TIMED_OUT: PURPLE,
     Outcome.INFEASIBLE: GREY,
 }
+END_COLOUR = {FAILED: BLACK, Outcome.NO_PATH: SKY, **OUTCOME_COLOUR}
+"""Of every way that a run of many can end, `RUN_ENDS`."""
 
 _STYLE: dict[Any, Any] = {
     "font.size": 9.0,

@@ -129,7 +129,7 @@ def _plot_joints(rows: list[list[Axes]], run: Run) -> None:
     for column, (title, units, values, lower, upper) in enumerate(panels):
         rows[0][column].set_title(f"{title} (shaded: beyond limits)")
         for j, axes in enumerate(row[column] for row in rows):
-            unit = units[_joint_unit(arm, j)]
+            unit = units[joint_unit(arm, j)]
             axes.plot(run.time, values[:, j], color=BLUE, linewidth=1.3)
             _draw_limits(axes, values[:, j], lower[j], upper[j])
             is_limited = np.isfinite(upper[j] - lower[j])
@@ -197,30 +197,44 @@ def _plot_joint_space(
     path = np.unwrap(arm.angles(run.q), axis=0)
     end = path[-1:] if goal is None else path[-1:] + arm.difference(run.q[-1], goal)
     first, second = plane_grid(_extent(arm, np.vstack([path, end])), _RESOLUTION)
-    q = arm.configurations(np.column_stack([first.ravel(), second.ravel()]))
     if density is not None:
+        q = arm.configurations(np.column_stack([first.ravel(), second.ravel()]))
         value = _log_values(density, q)
         lowest, highest = np.quantile(value[np.isfinite(value)], _SHOWN)
         levels = np.linspace(lowest, highest, _LEVELS)
         height = np.clip(value, lowest - 1.0, highest + 1.0).reshape(first.shape)
         shades = axes.contourf(first, second, height, levels, cmap=DENSITY_MAP, extend="both")
         axes.figure.colorbar(shades, ax=axes, label="ln ρ", format="%.1f", shrink=0.75)
-    clearance = np.array([world.distances(each).min(initial=np.inf) for each in q])
-    if np.isfinite(clearance).all():
-        h = (clearance - run.task.margin).reshape(first.shape)
-        axes.contourf(first, second, h, levels=[-np.inf, 0.0], colors=[GREY])
-        axes.contour(first, second, h, levels=[0.0], colors=[BLACK], linewidths=0.9)
+    draw_unsafe_set(axes, world, first, second, run.task.margin)
     axes.plot(*path.T, color=VERMILION, linewidth=2.0, label="motion")
     axes.plot(*path[0], "o", color=VERMILION, markeredgecolor=BLACK, markersize=7, label="start")
     if goal is not None:
         mark_goal(axes, end[0])
     axes.set_aspect("equal")
-    axes.set_xlabel(f"{arm.joint_names[0]} [{_joint_unit(arm, 0)}]")
-    axes.set_ylabel(f"{arm.joint_names[1]} [{_joint_unit(arm, 1)}]")
+    axes.set_xlabel(f"{arm.joint_names[0]} [{joint_unit(arm, 0)}]")
+    axes.set_ylabel(f"{arm.joint_names[1]} [{joint_unit(arm, 1)}]")
     shaded = "unsafe set (grey)" if density is None else "unsafe set (grey) and ln ρ to the goal"
     moving = ", obstacles as they begin" if world.fastest_obstacle > 0.0 else ""
     axes.set_title(f"joint space: {shaded}{moving}")
     axes.legend(loc="lower left", framealpha=0.95)
+
+
+def draw_unsafe_set(axes: Axes, world: World, first: Array, second: Array, margin: float) -> None:
+    """Draw where an arm of two joints touches something, or keeps no more than a margin [m].
+
+    Args:
+        axes: over the positions of both joints.
+        world: the arm among obstacles.
+        first: positions of the first joint on a grid (M, M) [rad or m].
+        second: positions of the second.
+        margin: distance that is unsafe.
+    """
+    q = world.arm.configurations(np.column_stack([first.ravel(), second.ravel()]))
+    clearance = np.array([world.distances(each).min(initial=np.inf) for each in q])
+    if np.isfinite(clearance).all():
+        h = (clearance - margin).reshape(first.shape)
+        axes.contourf(first, second, h, levels=[-np.inf, 0.0], colors=[GREY])
+        axes.contour(first, second, h, levels=[0.0], colors=[BLACK], linewidths=0.9)
 
 
 def _extent(arm: Arm, points: Array) -> list[float]:
@@ -240,7 +254,7 @@ def _extent(arm: Arm, points: Array) -> list[float]:
     return extent
 
 
-def _joint_unit(arm: Arm, joint: int) -> str:
+def joint_unit(arm: Arm, joint: int) -> str:
     """Return the unit of a joint's position: "m" where it slides, else "rad"."""
     kind = arm.model.joints[joint + 1].shortname().removeprefix("JointModel")
     return "m" if kind.startswith("P") else "rad"

@@ -1,6 +1,6 @@
 """Configurations that an arm can be at: why not, and random ones."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
@@ -36,7 +36,9 @@ def infeasibility(check: SweptCheck, ends: Mapping[str, Array]) -> str:
     )
 
 
-def clear_configurations(world: World, count: int, seed: int, margin: float = 0.0) -> list[Array]:
+def clear_configurations(
+    world: World, count: int, seed: int | Sequence[int], margin: float = 0.0
+) -> list[Array]:
     """Draw configurations evenly within the position limits, and keep those that are clear.
 
     Joints without limits are drawn from a whole turn. The first ones stay the same when more are
@@ -45,7 +47,7 @@ def clear_configurations(world: World, count: int, seed: int, margin: float = 0.
     Args:
         world: the arm among obstacles.
         count: number of configurations.
-        seed: whole number >= 0.
+        seed: whole number >= 0, or several.
         margin: distance that every pair must exceed [m].
 
     Returns:
@@ -55,8 +57,7 @@ def clear_configurations(world: World, count: int, seed: int, margin: float = 0.
         DensarmError: almost no configuration is clear.
     """
     random, arm = np.random.default_rng(seed), world.arm
-    lower = np.where(np.isfinite(arm.limits.lower), arm.limits.lower, -np.pi)
-    upper = np.where(np.isfinite(arm.limits.upper), arm.limits.upper, np.pi)
+    lower, upper = drawn_between(arm)
 
     def draw() -> Array:
         for _ in range(_DRAWS):
@@ -69,6 +70,12 @@ def clear_configurations(world: World, count: int, seed: int, margin: float = 0.
         )
 
     return [draw() for _ in range(count)]
+
+
+def drawn_between(arm: Arm) -> tuple[Array, Array]:
+    """Return the joint positions (nv,) that random ones are drawn between [rad or m]."""
+    lower = np.where(np.isfinite(arm.limits.lower), arm.limits.lower, -np.pi)
+    return lower, np.where(np.isfinite(arm.limits.upper), arm.limits.upper, np.pi)
 
 
 def _limit_faults(arm: Arm, q: Array) -> Iterator[str]:

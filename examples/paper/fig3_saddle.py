@@ -10,10 +10,10 @@ from densarm.density.navigation_density import DensityParameters, Gauge
 from densarm.euclidean.density import EuclideanDensity
 from densarm.euclidean.implicit import UnsafeRegion
 from densarm.euclidean.integral_curves import IntegralCurves, integral_curves
-from densarm.euclidean.runs import Proportion
 from densarm.euclidean.shapes import Ball
 from densarm.values.arrays import Array
 from densarm.values.outcome import Outcome
+from densarm.values.proportion import Proportion
 from densarm.visualization import figure_style as style
 
 TARGET = np.array([4.0, -3.0])  # [m]

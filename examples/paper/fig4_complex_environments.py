@@ -21,7 +21,6 @@ from densarm.euclidean.implicit import (
     smallest_value,
 )
 from densarm.euclidean.integral_curves import CurveParameters, IntegralCurves, integral_curves
-from densarm.euclidean.runs import Proportion
 from densarm.euclidean.shapes import (
     Ball,
     Bowtie,
@@ -33,6 +32,7 @@ from densarm.euclidean.shapes import (
 )
 from densarm.values.arrays import Array, Vector
 from densarm.values.outcome import Outcome
+from densarm.values.proportion import Proportion
 from densarm.visualization import figure_style as style
 
 BAR = 0.999  # of the starts, that must reach the goal

@@ -11,10 +11,10 @@ from densarm.euclidean.density import EuclideanDensity
 from densarm.euclidean.fields import NavigationField, NavigationFunction, PotentialField
 from densarm.euclidean.implicit import Complement, UnsafeRegion
 from densarm.euclidean.integral_curves import integral_curves
-from densarm.euclidean.runs import Proportion
 from densarm.euclidean.shapes import Ball, CShape, Egg
 from densarm.values.arrays import Array
 from densarm.values.outcome import Outcome
+from densarm.values.proportion import Proportion
 from densarm.visualization import figure_style as style
 
 GOAL = np.array([-9.0, 1.0])  # behind the closed side of the C [m]

@@ -11,11 +11,12 @@ from densarm.arms.joint_space import EuclideanSpace
 from densarm.density.navigation_density import DensityParameters, Gauge
 from densarm.euclidean.density import EuclideanDensity
 from densarm.euclidean.implicit import Placed, UnsafeRegion, smallest_value
-from densarm.euclidean.runs import PointRuns, Proportion, run_points
+from densarm.euclidean.runs import PointRuns, run_points
 from densarm.euclidean.shapes import Ball
 from densarm.simulation.plants import NoiseScaling, SingleIntegrator
 from densarm.values.arrays import Array
 from densarm.values.outcome import Outcome
+from densarm.values.proportion import Proportion
 from densarm.visualization import figure_style as style
 
 BEYOND = (2e-2, 1e-1)  # larger than in the paper, white: where the noise wins [m²/s]

@@ -21,7 +21,6 @@ from densarm.density.navigation_density import Gauge, NavigationDensity
 from densarm.density.unsafe_sets import ClearanceSet, UnsafeSet
 from densarm.euclidean.fields import JointSpaceField, SmallestClearance
 from densarm.euclidean.integral_curves import CurveParameters, IntegralCurves, integral_curves
-from densarm.euclidean.runs import Proportion
 from densarm.planning.motion import Motion, TimingParameters
 from densarm.planning.smoothing import smooth_path
 from densarm.planning.timing import time_path
@@ -30,6 +29,7 @@ from densarm.simulation.run import Run
 from densarm.simulation.simulate import simulate
 from densarm.values.arrays import Array
 from densarm.values.outcome import Outcome
+from densarm.values.proportion import Proportion
 from densarm.visualization import figure_style as style
 from densarm.world.swept_check import SweptVerdict
 from densarm.world.world import World

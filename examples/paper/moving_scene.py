@@ -12,10 +12,11 @@ from densarm.arms.joint_space import EuclideanSpace
 from densarm.density.navigation_density import DensityParameters, Gauge
 from densarm.euclidean.implicit import UnsafeRegion, smallest_value
 from densarm.euclidean.moving import EllipticMotion, MovingDensity, MovingRegion
-from densarm.euclidean.runs import PointRuns, Proportion, run_points
+from densarm.euclidean.runs import PointRuns, run_points
 from densarm.euclidean.shapes import Ball
 from densarm.simulation.plants import SingleIntegrator
 from densarm.values.arrays import Array
+from densarm.values.proportion import Proportion
 from densarm.visualization import figure_style as style
 
 U_MAX = 1.0  # [m/s]

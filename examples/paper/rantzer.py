@@ -13,10 +13,10 @@ from densarm.density.rantzer import RantzerCondition, rantzer_condition
 from densarm.euclidean.density import EuclideanDensity, rantzer_map
 from densarm.euclidean.implicit import UnsafeRegion
 from densarm.euclidean.integral_curves import CurveParameters, integral_curves
-from densarm.euclidean.runs import Proportion
 from densarm.euclidean.shapes import Ball
 from densarm.values.arrays import Array
 from densarm.values.outcome import Outcome
+from densarm.values.proportion import Proportion
 from densarm.visualization import figure_style as style
 
 TARGET = np.array([4.0, -3.0])  # the scene of Fig. 3 [m]

@@ -1,17 +1,13 @@
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
-from scipy.stats import binomtest
 
 from densarm.arms.joint_space import EuclideanSpace
 from densarm.density.navigation_density import DensityParameters, Gauge
-from densarm.errors import InvalidValueError
 from densarm.euclidean.density import EuclideanDensity
 from densarm.euclidean.fields import PotentialField
 from densarm.euclidean.implicit import UnsafeRegion
 from densarm.euclidean.moving import EllipticMotion, MovingDensity, MovingRegion
-from densarm.euclidean.runs import Proportion, run_points
+from densarm.euclidean.runs import run_points
 from densarm.euclidean.shapes import Ball
 from densarm.simulation.plants import SingleIntegrator
 from densarm.values.outcome import Outcome
@@ -106,20 +102,3 @@ def test_a_point_in_the_way_is_entered_by_what_is_faster_alone(speed: float, ent
         met = np.flatnonzero(runs.smallest_h[:, 0] <= 0.0)[0]
         assert (runs.x[met:] == runs.x[met]).all()
         np.testing.assert_array_equal(runs.u[met:], 0.0)
-
-
-@given(st.integers(1, 5000), st.floats(0.0, 1.0))
-def test_agrees_with_scipy(total: int, share: float) -> None:
-    count = round(share * total)
-    expected = binomtest(count, total).proportion_ci(0.95, method="wilson")
-    assert Proportion(count, total).interval == pytest.approx((expected.low, expected.high))
-
-
-def test_reads_as_a_percentage() -> None:
-    assert str(Proportion(1000, 1000)) == "100.0 % [99.6, 100.0]"
-
-
-@pytest.mark.parametrize(("count", "total"), [(-1, 5), (6, 5), (0, 0)])
-def test_impossible_counts_are_refused(count: int, total: int) -> None:
-    with pytest.raises(InvalidValueError):
-        Proportion(count, total)
