@@ -63,7 +63,7 @@ def as_completed(
                 n_workers=jobs,
                 threads_per_worker=1,
                 memory_limit=0,  # none: what runs out of it is told by the system
-                dashboard_address="127.0.0.1:0" if has_dashboard else None,
+                dashboard_address="127.0.0.1:0",  # any port; without bokeh it tells next to nothing
                 silence_logs=logging.CRITICAL,
                 preload=__name__,
             )
