@@ -84,17 +84,23 @@ def _results(
     # A task and not scattered data, which would be lost with the workers that hold it.
     shared = client.submit(pickle.loads, pickle.dumps(work), pure=False)
     futures = [client.submit(_alone, shared, chunk, pure=False) for chunk in chunks]
-    found, left = distributed.as_completed(futures, loop=client.loop), 0
+    chunk_of = {future.key: chunk for future, chunk in zip(futures, chunks, strict=True)}
+    found, suspects, left = distributed.as_completed(futures, loop=client.loop), list[Chunk](), 0
     futures.clear()  # what has come is not kept
     for future in found:
         try:
             yield future.result()
         except distributed.KilledWorker:
-            left += 1
+            suspects.append(chunk_of[future.key])
         except ImportError as error:
             message = f"{error}, on a worker: install the same densarm there"
             raise DensarmError(message) from None
         future.release()
+    for chunk in suspects:  # one by one: Dask blames those, too, that waited at a worker that died
+        try:
+            yield client.submit(_alone, shared, chunk, pure=False).result()
+        except distributed.KilledWorker:
+            left += 1
     if left:
         raise DensarmError(
             f"{left} of {len(chunks)} chunks were left, whose workers died again and again: the "
