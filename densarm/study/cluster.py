@@ -5,7 +5,7 @@ import logging
 import pickle
 import signal
 from collections.abc import Callable, Generator, Iterator, Sequence
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from importlib.util import find_spec
 from threading import Lock
 from typing import Any, TypeVar
@@ -83,6 +83,7 @@ def _results(
 ) -> Iterator[Result]:
     # A task and not scattered data, which would be lost with the workers that hold it.
     shared = client.submit(pickle.loads, pickle.dumps(work), pure=False)
+    workers = len(client.nthreads())
     futures = [client.submit(_alone, shared, chunk, pure=False) for chunk in chunks]
     chunk_of = {future.key: chunk for future, chunk in zip(futures, chunks, strict=True)}
     found, suspects, left = distributed.as_completed(futures, loop=client.loop), list[Chunk](), 0
@@ -102,6 +103,8 @@ def _results(
         except distributed.KilledWorker:
             left += 1
     if left:
+        with suppress(TimeoutError):  # Dask cannot close while it starts a worker again
+            client.wait_for_workers(workers, timeout=_CONNECTING)
         raise DensarmError(
             f"{left} of {len(chunks)} chunks were left, whose workers died again and again: the "
             "rest is done; is there memory enough?"
