@@ -1,5 +1,6 @@
 """GoalOnObstacle: regulation to a pose that goes with an obstacle, as a part on a conveyor."""
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -9,7 +10,7 @@ from numpy.typing import ArrayLike
 from densarm.arms.pose import Pose
 from densarm.control.inverse_dynamics import InverseDynamics
 from densarm.control.regulation import DensityRegulation
-from densarm.density.pose_distance import PoseDistance
+from densarm.scene.obstacles import pose_fields
 from densarm.values.arrays import Array
 from densarm.world.world import World
 
@@ -41,7 +42,6 @@ class GoalOnObstacle:
         there = pin.XYZQUATToSE3(world.obstacle_pose(obstacle))
         self._pose, self._on = pose, there.actInv(pose.placement)
         self._regulation = DensityRegulation(world, pose, **options)
-        self._distance = PoseDistance(world.arm, pose)
         self._next, self.lag, self._lag_in_motion = -np.inf, 0.0, np.nan
 
     @property
@@ -80,8 +80,8 @@ class GoalOnObstacle:
         """Act as `Controller.torque`."""
         if not self._next - _EVERY <= t < self._next:
             self._set_goal()
-            self._distance.set_pose(self.goal)
-            self.lag = self._distance.off(self._world.arm.check_configuration("q", q))[0]
+            here = self._world.arm.pose(q, self._pose.frame).position
+            self.lag = float(np.linalg.norm(np.subtract(here, self.goal.position)))
             self._lag_in_motion = self.lag if self.is_moving else self._lag_in_motion
             self._next = t + _EVERY
         return self._regulation.torque(t, q, v)
@@ -90,7 +90,6 @@ class GoalOnObstacle:
         there = pin.XYZQUATToSE3(self._world.obstacle_pose(self._obstacle))
         twist = self._world.obstacle_velocity(self._obstacle)
         now, turns = there.act(self._on), self._pose.orientation_xyzw is not None
-        x, y, z, *quaternion = pin.SE3ToXYZQUAT(now).tolist()
         twist[:3] += np.cross(twist[3:], now.translation - there.translation)
-        pose = Pose(self._pose.frame, (x, y, z), quaternion if turns else None, self._pose.free)
-        self._regulation.set_goal(pose, twist)
+        told = pose_fields(now) if turns else {"position": now.translation}
+        self._regulation.set_goal(replace(self._pose, **told), twist)

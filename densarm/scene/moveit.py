@@ -5,14 +5,21 @@ from collections.abc import Sequence
 from functools import partial
 from itertools import pairwise
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pinocchio as pin
 
 from densarm.errors import DensarmError, FileContentError, InvalidValueError, UnknownNameError
 from densarm.scene.mesh import Mesh, hull_corners
-from densarm.scene.obstacles import Box, Cylinder, HalfSpace, Obstacle, Sphere, numbered
+from densarm.scene.obstacles import (
+    Box,
+    Cylinder,
+    HalfSpace,
+    Obstacle,
+    Sphere,
+    numbered,
+    pose_fields,
+)
 from densarm.scene.scene import Scene
 from densarm.scene.shapes import circumscribed_circle
 from densarm.values.checks import finite_tuple, finite_vector, positive, unit_quaternion
@@ -84,12 +91,6 @@ def moveit_pose(name: str, position: Sequence[float], orientation: Sequence[floa
     if not turn.any():
         turn[3] = 1.0
     return pin.XYZQUATToSE3(np.array([*at, *unit_quaternion(f"orientation of {name}", turn)]))
-
-
-def pose_fields(pose: pin.SE3) -> dict[str, Any]:
-    """Return a pose as the fields of an obstacle."""
-    values = pin.SE3ToXYZQUAT(pose).tolist()
-    return {"position": tuple(values[:3]), "orientation_xyzw": tuple(values[3:])}
 
 
 class _Words:

@@ -9,8 +9,8 @@ import pinocchio as pin
 
 from densarm.errors import DensarmError, FileContentError, InvalidValueError
 from densarm.scene.mesh import Mesh
-from densarm.scene.moveit import moveit_mesh, moveit_obstacle, moveit_pose, pose_fields
-from densarm.scene.obstacles import Obstacle, numbered
+from densarm.scene.moveit import moveit_mesh, moveit_obstacle, moveit_pose
+from densarm.scene.obstacles import Obstacle, numbered, pose_fields
 from densarm.scene.scene import Attachment, Scene
 from densarm.values.files import read_text
 

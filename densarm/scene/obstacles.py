@@ -116,14 +116,13 @@ class Obstacle(ABC):
         begun = motion.pose(0.0, own)
         if begun.isApprox(own, _SAME_POSE):
             return
-        values = pin.SE3ToXYZQUAT(begun).tolist()
-        for key, value in (("position", values[:3]), ("orientation_xyzw", values[3:])):
+        for key, value in pose_fields(begun).items():
             given = getattr(self, key)
             signs = (1.0, -1.0) if key == "orientation_xyzw" else (1.0,)
             away = min(np.abs(np.subtract(given, np.multiply(x, value))).max() for x in signs)
             if away > _SAME_POSE and given != getattr(Obstacle, key):
-                raise InvalidValueError(f"{self.name}.{key}", given, f"left out, or {value}")
-            self._store(**{key: tuple(value)})
+                raise InvalidValueError(f"{self.name}.{key}", given, f"left out, or {list(value)}")
+            self._store(**{key: value})
 
     def _require_hull(self, key: str, sizes: tuple[float, ...]) -> None:
         """Refuse by its name what is too thin or too large for a hull."""
@@ -259,6 +258,12 @@ def obstacle_pose(obstacle: Obstacle, origin: ArrayLike = (0.0, 0.0, 0.0)) -> pi
     """Return the pose of an obstacle's frame, seen from a point of the world (3,) [m]."""
     position = np.subtract(obstacle.position, origin)
     return pin.XYZQUATToSE3(np.array([*position, *obstacle.orientation_xyzw]))
+
+
+def pose_fields(pose: pin.SE3) -> dict[str, Any]:
+    """Return a pose as the fields of an obstacle, of which `obstacle_pose` makes it."""
+    values = pin.SE3ToXYZQUAT(pose).tolist()
+    return {"position": tuple(values[:3]), "orientation_xyzw": tuple(values[3:])}
 
 
 def geometry_objects(

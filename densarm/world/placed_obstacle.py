@@ -8,7 +8,8 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike
 
-from densarm.scene.obstacles import Capsule, Obstacle, Sphere
+from densarm.scene.motion import ConstantVelocity
+from densarm.scene.obstacles import Capsule, Obstacle, Sphere, pose_fields
 from densarm.scene.shapes import FARTHEST
 from densarm.values.arrays import Array
 from densarm.values.checks import finite_vector
@@ -86,11 +87,9 @@ class PlacedObstacle:
         """Return the obstacle at rest where its velocity leads it, seen from a point as `hold`."""
         if self.obstacle.motion is None and not self.velocity.any():
             return self.present()
-        step, now = duration * self.velocity, pin.XYZQUATToSE3(self.pose + origin)
-        turned = pin.SE3(pin.exp3(step[3:]) @ now.rotation, now.translation + step[:3])
-        *position, x, y, z, w = pin.SE3ToXYZQUAT(turned).tolist()
-        pose: dict[str, Any] = {"position": position, "orientation_xyzw": (x, y, z, w)}
-        return replace(self.obstacle, **pose, motion=None)
+        goes_on = ConstantVelocity(linear=self.velocity[:3], angular=self.velocity[3:])
+        there = goes_on.pose(duration, pin.XYZQUATToSE3(self.pose + origin))
+        return replace(self.obstacle, **pose_fields(there), motion=None)
 
     def checked_pose(self, position: ArrayLike, orientation_xyzw: ArrayLike | None) -> Array:
         """Return a pose (7,) in the world, turned as it is if by None; errors as of an obstacle."""
