@@ -36,7 +36,7 @@ from densarm.scenarios.steps import (
     require_step,
     touching,
 )
-from densarm.scene.obstacles import Obstacle, obstacle_pose
+from densarm.scene.obstacles import Obstacle, obstacle_pose, pose_fields
 from densarm.scene.scene import Attachment, Scene
 from densarm.simulation.disturbances import Disturbances
 from densarm.simulation.run import Run
@@ -202,15 +202,9 @@ class _Cell:
             motion, passed_over = self._motion(k, world, start)
         except PlanningError as error:
             return Run.at_rest(task, world, error.outcome, error.detail)
-        controller = DensityTracking(
-            world,
-            motion,
-            gains=self._scenario.law_gains,
-            goal_distance=TorusDistance(arm, kappa=task.kappa),
-            density=task.density,
-            sensing=task.sensing,
-            actuation=self._scenario.actuation,
-        )
+        law = self._scenario.law_options | {"density": task.density}
+        distance = TorusDistance(arm, kappa=task.kappa)
+        controller = DensityTracking(world, motion, goal_distance=distance, **law)
         prepared = time.perf_counter() - began
         told = Disturbances() if isinstance(step, Grip) else self._scenario.disturbances
         task = replace(task, goal=motion.goal)
@@ -349,5 +343,4 @@ def _fault_on(q: Array, lines: Iterable[tuple[Line, SweptCheck]]) -> str:
 
 def _placed(body: Obstacle, pose: pin.SE3) -> Obstacle:
     """Return a body at a pose."""
-    values = pin.SE3ToXYZQUAT(pose).tolist()
-    return replace(body, position=tuple(values[:3]), orientation_xyzw=tuple(values[3:]))
+    return replace(body, **pose_fields(pose))

@@ -156,7 +156,7 @@ def by_density(
     """
     world = world or scenario.world
     if (pose := scenario.moving_goal) is not None:
-        law = _law(scenario) | _regulation(scenario)
+        law = scenario.law_options | _regulation(scenario)
         return Drive(GoalOnObstacle(world, pose, scenario.goal_follows, **law))
     found = _planned(scenario, world, scenario.start, guide)
     controller = _controller(scenario, world, found)
@@ -238,7 +238,7 @@ def _planned(
 
 def _controller(scenario: Scenario, world: World, planned: PlannedPath | Motion) -> Controller:
     """Return what drives an arm along a plan, in a scenario's form of control."""
-    control, law = scenario.control, _law(scenario)
+    control, law = scenario.control, scenario.law_options
     if isinstance(planned, PlannedPath):
         law |= _regulation(scenario)
         is_plain = control.form == ControlForm.PLAIN
@@ -248,15 +248,6 @@ def _controller(scenario: Scenario, world: World, planned: PlannedPath | Motion)
     if control.passive_speed is None:
         return DensityTracking(world, planned, **law)
     return PassiveTracking(world, planned, control.passive_speed, **law)
-
-
-def _law(scenario: Scenario) -> dict[str, Any]:
-    return {
-        "density": scenario.density,
-        "sensing": scenario.sensing,
-        "gains": scenario.law_gains,
-        "actuation": scenario.actuation,
-    }
 
 
 def _regulation(scenario: Scenario) -> dict[str, Any]:

@@ -180,6 +180,16 @@ class Scenario:
         return self.gains_of(self.control.form)
 
     @property
+    def law_options(self) -> dict[str, Any]:
+        """What it asks of tracking and regulation alike, but for V."""
+        return {
+            "density": self.density,
+            "sensing": self.sensing,
+            "gains": self.law_gains,
+            "actuation": self.actuation,
+        }
+
+    @property
     def plan_options(self) -> dict[str, Any]:
         """What it asks of `plan_motion` and `plan_path`, but for the goal."""
         control = self.control
