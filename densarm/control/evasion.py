@@ -100,8 +100,8 @@ class Evasion:
     where it flees. Bounds on q̇ are those of velocities, of what accelerations reach within 1/K_v,
     and of the way to joint limits. Rows are soft, since not all can hold at times, each measured
     along its gradient [rad/s or m/s], those of what stands 30 times: into a wall no ball may drive
-    the arm. Bounds hold always. Rows that hold for all velocities in
-    reach are left out, and where q̇_nom keeps all there is no problem to solve.
+    the arm. Bounds hold always. Rows that hold for all velocities in reach are left out, and where
+    q̇_nom keeps all there is no problem to solve.
 
     Args:
         world: the pairs; obstacles count as moving that have a motion, or were moved since now.

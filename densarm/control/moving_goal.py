@@ -21,8 +21,8 @@ class MovingGoal:
         w_k = \frac{g_k \ominus g_{k-1}}{t_k - t_{k-1}} \ \text{where no velocity is told}
 
     for 0.1 s. After that it rests, where it is by then, or where it was set if its velocity was not
-    told. That is zero where the last goal is of another kind, was set more than 0.1 s ago, or is
-    farther off than the arm's velocity limits reach, as when the goal jumps.
+    told. An estimated velocity is zero where the goal before is of another kind, was set more than
+    0.1 s ago, or is farther off than the arm's velocity limits reach, as when the goal jumps.
 
     Args:
         arm: its joint space.
