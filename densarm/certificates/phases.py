@@ -60,10 +60,10 @@ def certify_phases(phases: Sequence[Phase]) -> Certificate:
     """Return what is proved about a run of phases.
 
     Each part of their own certificates holds where it does in all of them. Beside these: each phase
-    begins where the last ended, of the same robot, as fast as that, or at rest where what is held
-    or moves changes (joined); bodies are held, or put down, where they were (held); frames are led
-    along lines (line); and what a held body may touch it enters by no more than `CONTACT_DEPTH`, on
-    such a line alone (support).
+    begins where the last ended, the first at rest, of the same robot, as fast as that, or at rest
+    where what is held or moves changes (joined); bodies are held, or put down, where they were
+    (held); frames are led along lines (line); and what a held body may touch it enters by no more
+    than `CONTACT_DEPTH`, on such a line alone (support).
     """
     names = dict.fromkeys(check.name for phase in phases for check in phase.certificate.checks)
     merged = (_merged(name, phases) for name in names)
@@ -116,6 +116,8 @@ def _merged(name: str, phases: Sequence[Phase]) -> Check:
 
 
 def _joined(phases: Sequence[Phase]) -> Check:
+    if phases[0].task.begins_in_motion:
+        return Check("joined", False, "the first phase begins in motion", None, 0.0)
     fastest, at, before = 0.0, 0.0, 0.0
     for k, (last, after) in enumerate(pairwise(phases), start=2):
         before += last.duration

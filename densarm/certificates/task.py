@@ -118,7 +118,7 @@ class Task:
     goal: Array | None = None
     """Configuration to reach (nq,); None where a controller has none."""
     start_velocity: Array | None = None
-    """Velocity at the start (nv,) [rad/s or m/s]; None for rest."""
+    """Velocity at the start (nv,) [rad/s or m/s], of a phase after another; None for rest."""
     name: str = "run"
     title: str = "run"
     margin: float = 0.0
@@ -164,6 +164,11 @@ class Task:
             items += geometry_objects(body) if isinstance(body, Mesh) else []
         sides = {item.name: _longest_side(item.geometry) for item in items}
         return {name: side for name, side in sides.items() if side > _LARGE}
+
+    @property
+    def begins_in_motion(self) -> bool:
+        """Whether it has a velocity at the start, as a phase after another alone may."""
+        return self.start_velocity is not None and bool(self.start_velocity.any())
 
     def goal_error(self, q: Array) -> float:
         """Return the largest joint error at q (nq,) [rad or m]; NaN without a goal."""

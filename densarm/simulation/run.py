@@ -14,7 +14,7 @@ import numpy as np
 from densarm.certificates.certificate import Certificate, certify
 from densarm.certificates.phases import Phase, certify_phases, positions_of, values_of
 from densarm.certificates.task import Input, Task
-from densarm.errors import DensarmError, FileContentError
+from densarm.errors import DensarmError, FileContentError, InvalidValueError
 from densarm.simulation.disturbances import Disturbances
 from densarm.values.arrays import Array
 from densarm.values.documented import documented
@@ -284,6 +284,9 @@ class Run:
             # What the arrays of the whole say is not asked, since they are those of the phases.
             phases = [cls._unpacked(data, f"{prefix}phase{k}.") for k in range(count)]
             return cls.of_phases(task, phases, **ended)
+        if task.begins_in_motion and not prefix:
+            allowed = "left out, but in a phase of a run, which begins as fast as the last ended"
+            raise InvalidValueError("start_velocity", task.start_velocity, allowed)
         deviation = result["tracking_error_rad"]
         return cls(
             task=task,

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -11,6 +12,7 @@ import densarm
 from densarm.arms.arm import Arm
 from densarm.certificates.certificate import Certificate
 from densarm.certificates.phases import LINE, Phase, certify_phases
+from densarm.errors import FileContentError
 from densarm.scene.scene import Scene
 from densarm.simulation.run import Run
 
@@ -48,6 +50,22 @@ def moved(phase: Phase, name: str, by: float) -> Phase:
 
 def test_as_they_are(phases: list[Phase]) -> None:
     assert certify_phases(phases).certified
+
+
+def test_a_first_phase_begins_at_rest(phases: list[Phase]) -> None:
+    goes_on = next(k for k, phase in enumerate(phases) if phase.task.begins_in_motion)
+    certificate = certify_phases(phases[goes_on:])
+    told = {check.name: check.detail for check in certificate.checks if check.holds is False}
+    assert told["joined"] == "the first phase begins in motion"
+
+
+def test_a_phase_that_begins_in_motion_is_no_run_by_itself(
+    carried_can: Run, tmp_path: Path
+) -> None:
+    goes_on = next(run for run in carried_can.phases if run.task.begins_in_motion)
+    goes_on.save(tmp_path / "phase.npz")
+    with pytest.raises(FileContentError, match=r"start_velocity = .* but in a phase of a run"):
+        Run.load(tmp_path / "phase.npz")
 
 
 def test_what_was_put_down_may_not_move(phases: list[Phase]) -> None:
