@@ -94,17 +94,15 @@ class RenderScene:
         self.closest = [replace(pair, points=pair.points - origin) for pair in nearest if pair]
         self.robot = arm_bodies(task.arm)
         self.obstacles = obstacle_bodies(task.scene, origin)
-        self.obstacle_poses = (
-            _poses_in_phases(run, rows, self.obstacles)
-            if run.phases
-            else _poses_in_motion(task.scene, self.obstacles, run.time[rows], origin)
-        )
         if run.phases:
-            carried = self.obstacle_poses
+            self.obstacle_poses = carried = _poses_in_phases(run, rows, self.obstacles)
             self.obstacles = tuple(
                 replace(body, color=CARRIED) if body.name in carried else body
                 for body in self.obstacles
             )
+        else:
+            times = run.time[rows]
+            self.obstacle_poses = _poses_in_motion(task.scene, self.obstacles, times, origin)
         self._solid = [body for body in self.obstacles if body.has_end]
         self.sensing_distance = task.margin + task.sensing.distance
         self.clearance = np.array([pair.distance for pair in self.closest])

@@ -16,6 +16,7 @@ from densarm.arms.pose import Pose
 from densarm.control.tracking import TRACKING_GAINS
 from densarm.scenarios import scenario
 from densarm.scenarios.steps import Attach, Detach
+from densarm.scene import scene
 from densarm.scene.motion import MOTION_TYPES
 from densarm.scene.obstacles import Obstacle
 from densarm.scene.scene import OBSTACLE_TYPES, Attachment
@@ -85,14 +86,7 @@ def scenario_tables() -> dict[str, list[Key]]:
     """Return the keys of every table, by the heading that the page gives it."""
     plain = scenario._KEYS - set(scenario.TABLES)
     own = {"gains": _GAINS}
-    every, held = (
-        [field.name for field in fields(Obstacle)],
-        (
-            "touch_links",
-            "mass",
-            "touch_obstacles",
-        ),
-    )
+    every = [field.name for field in fields(Obstacle)]
     return {
         "The file": [*_FILE.values(), *_keys(scenario.Scenario, plain - set(_FILE))],
         "[robot]": _keys(scenario._RobotTable, texts=_arguments_of_load_arm() | _ROBOT),
@@ -109,7 +103,7 @@ def scenario_tables() -> dict[str, list[Key]]:
         },
         "[[obstacles]] in the hand": [
             Key("attached_to", "text", "required", "Link, or other frame of the URDF, that holds."),
-            *_keys(Attachment, held),
+            *_keys(Attachment, scene._HOLDING),
         ],
         **{f'motion = {{ type = "{x}" }}': _keys(kind) for x, kind in MOTION_TYPES.items()},
         "[[steps]]": _STEPS,
