@@ -8,23 +8,19 @@ from numpy.typing import NDArray
 
 from densarm.control.disturbance_observer import AHEAD_VELOCITY, DISTURBANCE, FREE
 from densarm.control.inverse_dynamics import (
-    ATTRACT,
-    BRAKE,
     EFFORT_LIMIT,
     RATE_LIMIT,
     TORQUE,
     DynamicsArrays,
     InverseDynamics,
-    straight_torque,
 )
 from densarm.control.misses import MissesAhead, write_slope
 from densarm.control.soft_rows import nearest_in_box
 from densarm.density.inverse_bump import log_inverse_bump
 from densarm.values.arrays import Array
 from densarm.values.checks import non_negative, positive
-from densarm.values.cholesky import factorise, solve_factorised
 from densarm.values.documented import documented
-from densarm.values.kernels import compiled, compiled_part, entry_point
+from densarm.values.kernels import compiled, entry_point
 from densarm.world.active_pairs import ActivePairs, pair_motion
 from densarm.world.distance_view import pair_rate
 from densarm.world.stopping import HELD_SHARE
@@ -33,15 +29,14 @@ from densarm.world.world import World
 EVADING_GAIN = 40.0
 """K_v of the servo that follows an evading velocity [1/s]."""
 
-_LIMIT_SHARE = 0.85  # of velocities and accelerations, since torque lags behind by its rate
-_TIMES = 6  # at which misses are looked for, one every other call in turn
+_LIMIT_SHARE = 0.9  # of velocities and accelerations, since torque lags behind by its rate
+_TIMES = 8  # at which misses are looked for, one every other call in turn
 _FASTEST = 1e3  # [rad/s or m/s], where joints have no limit
 _RECOVERY = 4.0  # [1/s] of a margin that is lost, and at which the way to a joint limit shrinks
 _STANDING_RATE = 10.0  # [1/s] at which the distance to what stands may shrink
 _BRAKE_SHARE = 0.5  # of the accelerations, that a stop before what stands reckons with
 _REACH_SHARE = 1.1  # of what accelerations reach, since reach is of the next step
-_KEPT = 1.0 + 1e-6  # of accelerations asked for, which rounding may exceed
-_WEIGHT = 1e4  # of a row's lack [rad or m]
+_WEIGHT = 1e4  # of a row's lack
 _FIRMNESS = 30.0  # of rows of what stands, as if they lacked so many times as much
 _LEAST_SHARE = 1e-5  # of σ, of h where the bump is evaluated
 _LEAST_LEVER = 1e-9  # [m], of a row that some joint can do something about
@@ -68,7 +63,7 @@ class EvasionParameters:
     """Distance to keep from what moves, beside the motion's own margin [m]."""
     reaction: float = 0.03
     """Time for which what comes nearer goes on before the arm has reacted [s]."""
-    horizon: float = 0.5
+    horizon: float = 0.7
     """How far ahead misses are looked for [s]; zero for not at all."""
     miss: float = 0.06
     """By how much things that move are to be missed, beside the motion's margin [m]."""
@@ -95,13 +90,14 @@ class Evasion:
     The first keeps d ln Ψ_k/dt ≥ -γ, pair by pair: gradients of several pairs in one sum would
     cancel. It tells the arm to run from what comes, along its way. The last row tells it to
     step aside: ĥ_k is the clearance at the time t + τ if arm and obstacle go on as they do, its
-    gradient that there, and τ_0 the time in which a velocity is reached. Times up to the horizon
-    take turns. a_k is half of what the accelerations make along ∇h_k, so that the arm stops in time
-    where it flees. Bounds on q̇ are those of velocities, of what accelerations reach within 1/K_v,
-    and of the way to joint limits. Rows are soft, since not all can hold at times, each measured
-    along its gradient [rad/s or m/s], those of what stands 30 times: into a wall no ball may drive
-    the arm. Bounds hold always. Rows that hold for all velocities in reach are left out, and where
-    q̇_nom keeps all there is no problem to solve.
+    gradient that there, and τ_0 the time in which a velocity is reached; where something is to be
+    missed, what stands is as well. Times up to the horizon take turns. a_k is half of what the
+    accelerations make along ∇h_k, so that the arm stops in time where it flees. Bounds on q̇ are
+    those of velocities, of what accelerations reach within 1/K_v, and of the way to joint limits.
+    Rows are soft, since not all can hold at times, each measured along its gradient [rad/s or m/s],
+    those of what stands 30 times: into a wall no ball may drive the arm. Bounds hold always. Rows
+    that hold for all velocities in reach are left out, and where q̇_nom keeps all there is no
+    problem to solve.
 
     Args:
         world: the pairs; obstacles count as moving that have a motion, or were moved since now.
@@ -136,7 +132,7 @@ class Evasion:
         speed = _LIMIT_SHARE * np.minimum(limits.velocity, _FASTEST)
         self._limits = np.array([lower, upper, speed, _LIMIT_SHARE * limits.acceleration])
         is_moving, miss = self._is_moving, margin + p.miss
-        self._misses = MissesAhead(world, pairs, is_moving, self._limits, miss)
+        self._misses = MissesAhead(world, pairs, is_moving, self._limits, margin, miss)
         self._reaches = np.full((2, world.n_pairs), np.nan)
         slopes = pairs.kinematics.jacobian, world.sign, world.lipschitz
         self._now = pairs.state, pairs.rows, *slopes, world.twist, is_moving, pairs.reach
@@ -184,7 +180,8 @@ class Evasion:
     ) -> None:
         """Send the torque that leads to a velocity (nv,), by K_v and an acceleration (nv,) ahead.
 
-        Accelerations are kept within their limits, before the torque rate of the dynamics.
+        Its accelerations are those nearest to what is wanted, in shares of their limits, that
+        torque limits and the torque rate of the dynamics allow.
         """
         ahead = self._none if ahead is None else ahead
         _send(dynamics.arrays, wanted, ahead, self._most)
@@ -267,54 +264,40 @@ def _nearest(
 
 @compiled
 def _send(arrays: DynamicsArrays, wanted: Array, ahead: Array, most: Array) -> None:
-    rows = arrays[3]
-    for i in range(most.size):
-        a = EVADING_GAIN * (wanted[i] - rows[AHEAD_VELOCITY, i]) + ahead[i]
-        rows[ATTRACT, i], rows[BRAKE, i] = min(max(a, -most[i]), most[i]), 0.0
-    straight_torque(arrays)
-    _keep_accelerations(arrays, most)
-
-
-@compiled_part
-def _keep_accelerations(arrays: DynamicsArrays, most: Array) -> None:
-    """Change the torque within its rate so that accelerations keep their limits, if they can.
-
-    What was sent before leads elsewhere by now: where the rate binds, not all that is between that
-    and a torque that is allowed is allowed as well.
-    """
+    """Write the torque that is sent: where one joint's is at its limit, the others go on."""
     mass, nonlinear, gravity, rows, sent = arrays[:5]
-    n, fastest = most.size, 0.0
-    factor, a, offset = np.empty((n, n)), np.empty(n), np.empty(n)
-    factorise(mass, factor)
+    n, holds = most.size, True
+    a, low, high, offset = np.empty(n), np.empty(n), np.empty(n), np.empty(n)
+    table, least = np.empty((2 * n, n)), np.empty(2 * n)
     for i in range(n):
-        offset[i] = nonlinear[i] - rows[DISTURBANCE, i]
-        a[i] = rows[TORQUE, i] - offset[i]
-    solve_factorised(factor, a)
-    for i in range(n):
-        fastest = max(fastest, abs(a[i]) / most[i])
-    if fastest <= _KEPT:
-        return
-    table, least, low, high = np.empty((2 * n, n)), np.empty(2 * n), np.empty(n), np.empty(n)
-    for i in range(n):
-        row = table[i]
-        row[:] = 0.0
-        row[i] = 1.0
-        solve_factorised(factor, row)  # of the inverse of M
-        length, still = 0.0, 0.0
-        for j in range(n):
-            length += row[j] * row[j]
-            still += row[j] * offset[j]
-        length = math.sqrt(length)
-        least[i], least[n + i] = (still - most[i]) / length, -(still + most[i]) / length
-        for j in range(n):
-            row[j] /= length
-            table[n + i, j] = -row[j]
+        pull = EVADING_GAIN * (wanted[i] - rows[AHEAD_VELOCITY, i]) + ahead[i]
+        a[i] = min(max(pull / most[i], -1.0), 1.0)
         before, limit = rows[FREE, i] + gravity[i], rows[EFFORT_LIMIT, i]
         low[i] = max(-limit, before - rows[RATE_LIMIT, i])
         high[i] = max(low[i], min(limit, before + rows[RATE_LIMIT, i]))
-    nearest_in_box(rows[TORQUE].copy(), table, least, low, high, _WEIGHT, a)
+        offset[i] = nonlinear[i] - rows[DISTURBANCE, i]
     for i in range(n):
-        rows[TORQUE, i] = sent[-1, i] = a[i]
+        tau, length = offset[i], 0.0
+        for j in range(n):
+            table[i, j] = most[j] * (mass[i, j] if i <= j else mass[j, i])
+            tau += table[i, j] * a[j]
+            length += table[i, j] * table[i, j]
+        holds &= low[i] <= tau <= high[i]
+        rows[TORQUE, i], length = tau, math.sqrt(length)
+        least[i], least[n + i] = (low[i] - offset[i]) / length, (offset[i] - high[i]) / length
+        for j in range(n):
+            table[i, j] /= length
+            table[n + i, j] = -table[i, j]
+    if not holds:
+        most_share, found = np.ones(n), np.empty(n)
+        nearest_in_box(a, table, least, -most_share, most_share, _WEIGHT, found)
+        for i in range(n):
+            tau = offset[i]
+            for j in range(n):
+                tau += most[j] * (mass[i, j] if i <= j else mass[j, i]) * found[j]
+            rows[TORQUE, i] = min(max(tau, low[i]), high[i])
+    for i in range(n):
+        sent[-1, i] = rows[TORQUE, i]
 
 
 @compiled

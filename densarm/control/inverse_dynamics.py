@@ -304,20 +304,6 @@ def robust_torque(gain: float, elapsed: float, late: float, arrays: DynamicsArra
 
 
 @compiled_part
-def straight_torque(arrays: DynamicsArrays) -> None:
-    """Write and send the torque of two accelerations, the rows `BRAKE` and `ATTRACT`."""
-    mass, nonlinear, rows = arrays[0], arrays[1], arrays[3]
-    n = nonlinear.shape[0]
-    for i in range(n):
-        tau = nonlinear[i] - rows[DISTURBANCE, i]
-        for j in range(n):
-            entry = mass[i, j] if i <= j else mass[j, i]
-            tau += entry * (rows[BRAKE, j] + rows[ATTRACT, j])
-        rows[TORQUE, i] = _clipped(tau, rows[EFFORT_LIMIT, i])
-    send(arrays)
-
-
-@compiled_part
 def _clipped(x: float, most: float) -> float:
     return most if x > most else -most if x < -most else x
 

@@ -27,14 +27,16 @@ class MissesAhead:
     .. math:: \hat h_k + (\tau - \tau_0) \nabla \hat h_k \cdot (\dot q - v) \ge 0
 
     ĥ_k and its gradient are those at the time t + τ. Asked for are pairs awake which may be within
-    reach then by their Lipschitz constants, and then by balls around their bodies.
+    reach then by their Lipschitz constants, and then by balls around their bodies: those whose
+    obstacle moves, and, if there are any, those of what stands, lest the arm step aside into it.
 
     Args:
         world: the pairs.
         pairs: the same, updated by their owner.
         is_moving: which pairs have an obstacle that moves (K,), kept by its owner.
         limits: least and largest joint positions, in the first two rows.
-        miss: by how much bodies are to miss each other [m].
+        margin: to keep from what stands [m].
+        miss: by how much what moves is to be missed [m].
     """
 
     def __init__(
@@ -43,10 +45,12 @@ class MissesAhead:
         pairs: ActivePairs,
         is_moving: NDArray[np.bool_],
         limits: Array,
+        margin: float,
         miss: float,
     ) -> None:
         arm, geometry = world.arm, world.geometry_model
-        self._world, self._limits, self._miss = world, limits, miss
+        self._world, self._limits = world, limits
+        self._margins, self._reach = np.array([margin, miss]), miss + _REACH
         self._queries = PairQueries(arm.model, geometry, world.pair_shapes, remembers=False)
         self._places, self._came = shape_positions(self._queries.data), -1
         self._data = arm.model.createData()
@@ -62,10 +66,12 @@ class MissesAhead:
         self._may_meet = entry_point(
             _may_meet, self._now, there, there, limits, 0.0, 0.0, near, there
         )
-        self._balls = self._bodies, world.pair_shapes, self._places, self._radius, world.twist
+        shapes = self._bodies, world.pair_shapes, self._places, self._radius
+        self._balls = is_moving, *shapes, world.twist
         self._meet = entry_point(_meet, near, *self._balls, 0.0, 0.0)
-        rows = self._queries.rows, self._jacobian, world.sign, there, 0.0, 0.0
-        self._miss_rows = entry_point(_miss_rows, near, *rows, np.zeros((1, arm.nv + 1)))
+        self._slopes = is_moving, self._queries.rows, self._jacobian, world.sign
+        rows = *self._slopes, there, self._margins, 0.0, np.zeros((1, arm.nv + 1))
+        self._miss_rows = entry_point(_miss_rows, near, *rows)
 
     def write(self, angles: Array, v: Array, ahead: float, table: Array) -> int:
         """Write rows [∇h, b] (nv + 1,) for ∇h · q̇ ≥ b into a table, and return how many.
@@ -76,7 +82,7 @@ class MissesAhead:
             ahead: τ [s].
             table: rows (at least K, nv + 1).
         """
-        world, near, there, reach = self._world, self._near, self._there, self._miss + _REACH
+        world, near, there, reach = self._world, self._near, self._there, self._reach
         n, turns, came = self._may_meet(
             self._now, angles, v, self._limits, ahead, reach, near, there
         )
@@ -93,10 +99,8 @@ class MissesAhead:
             data.oMg[shape].rotation = turn @ data.oMg[shape].rotation
         n = self._meet(near[:n], *self._balls, ahead, reach)
         self._queries.ask(near[:n])
-        rows, soon = self._queries.rows, max(ahead - _LAG, _SOONEST)
-        return int(
-            self._miss_rows(near[:n], rows, self._jacobian, world.sign, v, self._miss, soon, table)
-        )
+        soon = max(ahead - _LAG, _SOONEST)
+        return int(self._miss_rows(near[:n], *self._slopes, v, self._margins, soon, table))
 
     def _measure(self) -> None:
         """Measure the balls, after an obstacle has come."""
@@ -124,24 +128,26 @@ def _may_meet(
         an obstacle came with.
     """
     state, rows, is_moving, lipschitz, twist, changes = now
-    count, turns, came, fastest = 0, False, 0, np.abs(v)
+    count, turns, some, came, fastest = 0, False, False, 0, np.abs(v)
     for k in range(state.shape[0]):
         came = max(came, changes[k])
-        if state[k] == 0 or not is_moving[k]:
+        if state[k] == 0:
             continue
         speed = math.sqrt(twist[k, 0] ** 2 + twist[k, 1] ** 2 + twist[k, 2] ** 2)
         if rows[k, 0] - (speed + pair_motion(lipschitz, k, fastest)) * ahead < reach:
             near[count] = k
             count += 1
+            some |= is_moving[k]
             turns |= twist[k, 3] != 0.0 or twist[k, 4] != 0.0 or twist[k, 5] != 0.0
     for j in range(v.size):
         there[j] = min(max(angles[j] + ahead * v[j], limits[0, j]), limits[1, j])
-    return count, turns, came
+    return count if some else 0, turns, came
 
 
 @compiled
 def _meet(
     near: NDArray[np.int64],
+    is_moving: NDArray[np.bool_],
     bodies: NDArray[np.int64],
     pair_shapes: NDArray[np.int64],
     places: Array,
@@ -158,7 +164,7 @@ def _meet(
         places[shape, 0] += ahead * (twist[k, 0] + (wy * z - wz * y))
         places[shape, 1] += ahead * (twist[k, 1] + (wz * x - wx * z))
         places[shape, 2] += ahead * (twist[k, 2] + (wx * y - wy * x))
-    count = 0
+    count, some = 0, False
     for k in near:
         first, second = pair_shapes[k]
         gap = -radius[first] - radius[second]
@@ -166,28 +172,31 @@ def _meet(
         if not gap > reach:  # a half-space has no middle
             near[count] = k
             count += 1
-    return count
+            some |= is_moving[k]
+    return count if some else 0
 
 
 @compiled
 def _miss_rows(
     near: NDArray[np.int64],
+    is_moving: NDArray[np.bool_],
     rows: Array,
     jacobian: Array,
     sign: Array,
     v: Array,
-    miss: float,
+    margins: Array,
     soon: float,
     table: Array,
 ) -> int:
-    count, n = 0, v.size
+    count, n, some = 0, v.size, False
     for k in near:
-        h = rows[k, 0] - miss
+        h = rows[k, 0] - margins[int(is_moving[k])]
         if h <= _REACH:
+            some |= is_moving[k]
             table[count, n] = write_slope(rows[k], jacobian, sign[k], v, table[count])
             table[count, n] -= h / soon
             count += 1
-    return count
+    return count if some else 0
 
 
 @compiled_part

@@ -4,7 +4,7 @@ import json
 import time
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import nullcontext
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from functools import partial
 from importlib.util import find_spec
 from itertools import product
@@ -16,8 +16,10 @@ import pinocchio as pin
 
 from densarm.arms.arm import Arm, load_arm
 from densarm.certificates.task import REACHED_POSITION, REACHED_VELOCITY
+from densarm.control.controller import Controller
 from densarm.control.evasion import Evasion, EvasionParameters
 from densarm.control.passive import PassiveTracking
+from densarm.control.replanning import PlanningInLoop, Replanning
 from densarm.control.tracking import DensityTracking
 from densarm.errors import DensarmError, FileContentError
 from densarm.planning.motion import Motion, PlanningError
@@ -29,6 +31,7 @@ from densarm.simulation.plants import PinocchioPlant
 from densarm.study.evasions import CbfpyEvasion, DamperEvasion, MinkEvasion, StopAndGo
 from densarm.study.problems import in_processes, named_arm
 from densarm.study.random_problems import Workspace
+from densarm.values.arrays import Array
 from densarm.values.checks import non_negative_integer, one_of, positive, positive_integer
 from densarm.world.near_pairs import NearPairs
 from densarm.world.world import World
@@ -47,6 +50,7 @@ _WAY = 0.6, 1.0  # [m] that a ball goes to an arm at rest
 _PASSING = 0.6  # [m] that balls go on
 _RETURN = 4.0  # [s] for the way back after they passed
 _AT_REST = 0.01  # [rad/s]
+_PLANNING_TIME, _PATIENCE = 0.1, 0.2  # [s] that planning takes, and that an arm stands before
 _POSE_PERIOD, _POSE_NOISE = 0.01, 0.005  # [s], [m] in each axis, where velocities are not told
 
 
@@ -124,12 +128,30 @@ def _passive(world: World, motion: Motion) -> PassiveTracking:
     return PassiveTracking(world, motion, world.fastest_obstacle)
 
 
+def _plan_again(world: World, motion: Motion) -> Replanning:
+    """Return what brakes as `StopAndGo`, and plans around where obstacles will be then."""
+    arm, tracking = world.arm, DensityTracking(world, motion, evasion=StopAndGo)
+
+    def plan(predicted: World, q: Array) -> Callable[[Array], Controller]:
+        found = replace(plan_motion(predicted, q, tracking.goal), world=world)
+
+        def follow(now: Array) -> Controller:
+            tracking.follow(found, now)
+            return tracking
+
+        return follow
+
+    planner = PlanningInLoop(world, plan, _PLANNING_TIME)
+    return Replanning(arm, tracking.goal, tracking, planner, _PATIENCE, period=_PERIOD)
+
+
 _NEAR = partial(Evasion, parameters=EvasionParameters(horizon=0.0))
-METHODS: Mapping[str, Callable[[World, Motion], DensityTracking | PassiveTracking]] = {
+METHODS: Mapping[str, Callable[[World, Motion], DensityTracking | PassiveTracking | Replanning]] = {
     "density": DensityTracking,
     "density_near": partial(DensityTracking, evasion=_NEAR),
     "damper_qp": partial(DensityTracking, evasion=DamperEvasion),
     "stop_and_go": partial(DensityTracking, evasion=StopAndGo),
+    "plan_again": _plan_again,
     "mink": partial(DensityTracking, evasion=MinkEvasion),
     "cbfpy": partial(DensityTracking, evasion=CbfpyEvasion),
     "passive": _passive,
