@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+import daqp
 import numpy as np
 import pytest
 from hypothesis import assume, given, settings
@@ -12,7 +13,7 @@ import densarm
 from densarm.arms.arm import Arm, load_arm
 from densarm.control.disturbance_observer import AHEAD_VELOCITY, DISTURBANCE
 from densarm.control.evasion import EVADING_GAIN, Evasion, EvasionParameters
-from densarm.control.inverse_dynamics import InverseDynamics
+from densarm.control.inverse_dynamics import TORQUE, InverseDynamics
 from densarm.control.regulation import DensityRegulation
 from densarm.control.tracking import DensityTracking
 from densarm.density.inverse_bump import log_inverse_bump
@@ -136,7 +137,7 @@ def test_scenarios_among_what_moves_are_certified(scenario: str, clearance: floa
 def test_accelerations_keep_their_limits_where_the_rate_of_torques_binds(
     keeps: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The torque that is farthest along the straight way to the one that is wanted does not."""
+    """A torque that changes along the straight way to the one that is wanted does not."""
     trial = draw_trial(load_arm("panda", shapes="capsule"), 4, 1.0, 11)
     arm, world = trial.arm, World(trial.arm, trial.scene)
     if not keeps:
@@ -164,6 +165,41 @@ def test_accelerations_keep_their_limits_where_the_rate_of_torques_binds(
         v = after
     assert (fastest <= 1.0) == keeps
     assert np.abs(np.diff(torques, axis=0)).max() <= 1.0 + 1e-9
+
+
+@settings(max_examples=60, deadline=None)
+@given(seed=st.integers(0, 10**6), moved=st.floats(0.0, 2.0))
+def test_the_torque_that_is_sent_has_the_nearest_accelerations_that_limits_and_rates_allow(
+    with_ball: World, seed: int, moved: float
+) -> None:
+    """Joint 2 near its torque limit, or a torque sent before that was for something else."""
+    arm, random = with_ball.arm, np.random.default_rng(seed)
+    evasion = Evasion(with_ball, ActivePairs(with_ball), 0.0, PLAIN)
+    dynamics = InverseDynamics(arm, np.full(arm.nv, np.inf))
+    q = arm.configurations(random.uniform(arm.limits.lower, arm.limits.upper))
+    v = 0.3 * random.uniform(-1.0, 1.0, arm.nv) * arm.limits.velocity
+    dynamics.update(0.0, q, v)
+    gravity = arm.nonlinear_effects(q, np.zeros(arm.nv))
+    before = gravity + moved * random.uniform(-1.0, 1.0, arm.nv)
+    before = dynamics.send(np.clip(before, -arm.limits.effort, arm.limits.effort))
+    dynamics.update(0.001, q, v)
+    wanted, most = v + random.uniform(-0.5, 0.5, arm.nv), HELD_SHARE * arm.limits.acceleration
+    evasion.send_torque(dynamics, wanted)
+    tau, mass = dynamics.rows[TORQUE], arm.mass_matrix(q)
+    step = 0.001 * arm.limits.torque_rate
+    low = np.maximum(-arm.limits.effort, before - step)
+    high = np.minimum(arm.limits.effort, before + step)
+    assert ((low - 1e-9 <= tau) & (tau <= high + 1e-9)).all()
+    offset = arm.nonlinear_effects(q, v) - dynamics.disturbance
+    share = np.linalg.solve(mass, tau - offset) / most
+    aim = np.clip(EVADING_GAIN * (wanted - dynamics.velocity) / most, -1.0, 1.0)
+    upper, lower = (
+        np.append(np.ones(arm.nv), high - offset),
+        np.append(-np.ones(arm.nv), low - offset),
+    )
+    best, _, flag, _ = daqp.solve(np.eye(arm.nv), -aim, mass * most, upper, lower)
+    assume(flag > 0)  # some torque keeps all limits of acceleration
+    np.testing.assert_allclose(share, best, atol=0.02)
 
 
 @pytest.mark.slow
