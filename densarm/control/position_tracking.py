@@ -14,7 +14,7 @@ from densarm.values.checks import positive
 _USED_SHARE = 0.9  # of a motion's tube, which the arm may use
 _LONGEST_STEP = 2.0  # periods that the motion goes on by at once, however late a call is
 _CLOCK_RATE = 20.0  # ω [1/s]
-_PAUSE_SHARE = 0.95  # of the acceleration limits, that pausing takes with the motion
+_LIMIT_SHARE = 0.95  # of acceleration limits, that pausing and going on take with the motion
 _PAUSED = 0.01  # σ̇ below which the reference counts as at rest
 _DISTANCE = 0.02  # [rad or m], of motions without a tube
 
@@ -68,21 +68,22 @@ class PositionTracking(ToldByGoal):
         sample = self.motion.sample(self._sigma)
         step = min(_CLOCK_RATE * elapsed, 1.0)
         self._change += step * (_CLOCK_RATE * (self._wanted - self._rate) - 2.0 * self._change)
-        if self._wanted == 0.0:
-            self._change = max(self._change, self._slowest(sample.velocity, sample.acceleration))
+        slowest, fastest = self._bounds(sample.velocity, sample.acceleration)
+        self._change = min(max(self._change, slowest), fastest)
         self._rate = max(self._rate + elapsed * self._change, 0.0)
         self._told.append(sample.position)
         self._keep_to_the_motion(t, q)
         return self.motion.sample(self._sigma + self._rate * period).position
 
-    def _slowest(self, velocity: Array, acceleration: Array) -> float:
-        """Return the σ̈, at most zero, below which a pause would break acceleration limits."""
+    def _bounds(self, velocity: Array, acceleration: Array) -> tuple[float, float]:
+        """Return bounds on σ̈, about zero, within which accelerations keep their limits."""
         moves = velocity != 0.0
         if not moves.any():
-            return -np.inf
-        along = self._rate**2 * np.sign(velocity) * acceleration
-        least = -(_PAUSE_SHARE * self._arm.limits.acceleration + along)[moves]
-        return min(float((least / np.abs(velocity[moves])).max()), 0.0)
+            return -np.inf, np.inf
+        along = (self._rate**2 * np.sign(velocity) * acceleration)[moves]
+        most, speed = _LIMIT_SHARE * self._arm.limits.acceleration[moves], np.abs(velocity[moves])
+        least, largest = ((-most - along) / speed).max(), ((most - along) / speed).min()
+        return min(float(least), 0.0), max(float(largest), 0.0)
 
     def _keep_to_the_motion(self, t: float, q: Array) -> None:
         told = np.array(self._told)
