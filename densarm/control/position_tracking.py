@@ -33,24 +33,28 @@ class PositionTracking(ToldByGoal):
     Args:
         arm: the arm.
         motion: q_d(t), as `plan_motion` makes it, from where the robot is.
+        period: time between two calls, the robot's [s]; None for the motion's.
         lag: how long the robot may take to be where it was told to be [s].
 
     Attributes:
-        motion: as given.
+        motion, period: as given.
         goal: where it ends (nq,).
         reference: the place nearest to the arm of those where it was told to be (nv,) [rad or m].
         tracking_error: how far the arm was off it at the last call [rad or m].
 
     Raises:
-        InvalidValueError: a lag that is not positive.
+        InvalidValueError: a period or lag that is not positive.
     """
 
-    def __init__(self, arm: Arm, motion: Motion, lag: float = 0.2) -> None:
+    def __init__(
+        self, arm: Arm, motion: Motion, period: float | None = None, lag: float = 0.2
+    ) -> None:
+        self.period = motion.period if period is None else positive("period", period)
         self._arm, self.motion = arm, motion
         self.goal = arm.configurations(motion.position[-1])
         self.reference, self.tracking_error = np.array(motion.position[0]), 0.0
         self._bound = np.full(arm.nv, _DISTANCE) if motion.tube is None else motion.tube
-        count = int(np.ceil(positive("lag", lag) / motion.period))
+        count = int(np.ceil(positive("lag", lag) / self.period))
         self._told: deque[Array] = deque([self.reference], maxlen=count + 1)
         self._time: float | None = None  # of the last call
         self._sigma, self._rate, self._change, self._wanted = 0.0, 1.0, 0.0, 1.0
@@ -61,9 +65,8 @@ class PositionTracking(ToldByGoal):
     def position(self, t: float, q: ArrayLike, v: ArrayLike) -> Array:
         """Return the joint positions to command (nv,) [rad or m]; else as `Controller.torque`."""
         q, v = checked_state(self._arm, q, v)
-        period = self.motion.period
         elapsed = 0.0 if self._time is None else t - self._time
-        elapsed, self._time = min(max(elapsed, 0.0), _LONGEST_STEP * period), t
+        elapsed, self._time = min(max(elapsed, 0.0), _LONGEST_STEP * self.period), t
         self._sigma += self._rate * elapsed
         sample = self.motion.sample(self._sigma)
         step = min(_CLOCK_RATE * elapsed, 1.0)
@@ -73,7 +76,7 @@ class PositionTracking(ToldByGoal):
         self._rate = max(self._rate + elapsed * self._change, 0.0)
         self._told.append(sample.position)
         self._keep_to_the_motion(t, q)
-        return self.motion.sample(self._sigma + self._rate * period).position
+        return self.motion.sample(self._sigma + self._rate * self.period).position
 
     def _bounds(self, velocity: Array, acceleration: Array) -> tuple[float, float]:
         """Return bounds on σ̈, about zero, within which accelerations keep their limits."""

@@ -60,9 +60,9 @@ def drive(
     The clock is the robot's: each state that it sends is answered by one command. A torque comes
     through a `Supervisor`, the one given or one of its own, which stops the arm where state, clock
     or controller go wrong; where it does not believe the states for 20 ms, the robot stops itself,
-    and what the robot's protocol refuses ends the run. In the end, whatever
-    happens, `Robot.stop` is called. Ctrl-C brakes the arm as `Supervisor.stop` does, and raises
-    once it rests; pressed again, it stops the robot at once.
+    and what the robot's protocol refuses ends the run. In the end, whatever happens, `Robot.stop`
+    is called. Ctrl-C brakes the arm as `Supervisor.stop` does, and raises once it rests; pressed
+    again, it stops the robot at once.
 
     Nothing here is a certified safety function: the robot's own limits, its emergency stop and
     whoever can press it come first.
@@ -83,8 +83,8 @@ def drive(
     Raises:
         RobotError: the robot does not answer before the first command.
         DriveInterrupted: Ctrl-C, at rest again.
-        InvalidValueError: the robot has another number of joints, moves, or is not where the
-            controller's motion begins; else as `simulate`.
+        InvalidValueError: the robot has another number of joints, moves, is not where the
+            controller's motion begins, or has another period; else as `simulate`.
     """
     arm, first = world.arm, robot.read()
     told = Input(one_of("input of the robot", robot.input, list(Input)))
@@ -94,6 +94,8 @@ def drive(
     if not callable(getattr(law, told, None)):
         allowed = f"one with a method {told}(t, q, v), which this robot needs"
         raise InvalidValueError("controller", type(controller).__name__, allowed)
+    if (period := getattr(law, "period", robot.period)) != robot.period:
+        raise InvalidValueError("period of the controller", period, f"the robot's, {robot.period}")
     start = _start(world, law, first)
     wanted: Any = getattr(law, "goal", None) if goal is None else goal
     wanted, pose = (None, wanted) if isinstance(wanted, Pose) else (wanted, None)
@@ -203,7 +205,7 @@ class _Loop:
             reading = self.robot.read()
             began = reading.time - p.dt if began is None else began
             t = reading.time - began
-            q, v = self.task.arm.configuration(reading.position), reading.velocity
+            q, v = self._configuration(reading), reading.velocity
             self.world.set_time(t)
             u = self._input(t, q, v)
             self.robot.command(u)
@@ -228,6 +230,12 @@ class _Loop:
             elif ended := self._ending.after(k, q, v):
                 return ended, ""
         return Outcome.TIMED_OUT, f"after {p.time_limit:.3g} s"
+
+    def _configuration(self, reading: Reading) -> Array:
+        try:
+            return self.task.arm.configuration(reading.position)
+        except InvalidValueError as error:
+            raise RobotError(f"the robot sent what is no state: {error}") from None
 
     def _was_stopped(self, t: float) -> bool:
         """Return whether a supervisor's stop is over, or the robot's own knows more than it."""

@@ -36,6 +36,7 @@ class FakeRobot:
     lost: frozenset[int] = frozenset()  # states that never arrive
     stops_at: float = np.inf  # [s]
     lies_from: float = np.inf  # [s], from when its positions are off
+    lies_by: float = 0.3  # [rad]
     stands_from: float = np.inf  # [s], from when its joints stand, whatever is told
     ctrl_c_at: float = np.inf  # [s]
     lag: float = 0.03  # [s] of positions that are told
@@ -58,7 +59,7 @@ class FakeRobot:
         if now > self.ctrl_c_at:
             self.ctrl_c_at = np.inf
             os.kill(os.getpid(), signal.SIGINT)
-        off = 0.3 if now > self.lies_from else 0.0
+        off = self.lies_by if now > self.lies_from else 0.0
         return Reading(7.0 + now, self.world.arm.angles(self.q) + off, self.v)
 
     def advance(self) -> None:
@@ -169,6 +170,14 @@ def test_a_supervisor_that_trusts_lets_a_controller_act_and_fail(
     assert drive(robot, posts, trusting).outcome == Outcome.REACHED
 
 
+def test_what_is_no_number_is_no_state(posts: World, motion: Motion) -> None:
+    robot = FakeRobot(posts, lies_from=0.1, lies_by=np.nan)
+    run = drive(robot, posts, DensityTracking(posts, motion))
+    assert run.outcome == Outcome.STUCK
+    assert run.detail.startswith("the robot sent what is no state: ")
+    assert robot.stops == 1
+
+
 def test_ctrl_c_brings_the_arm_to_rest_and_then_raises_with_the_run(
     posts: World, motion: Motion
 ) -> None:
@@ -229,6 +238,9 @@ def test_what_cannot_be_driven_is_refused_before_a_command(posts: World, motion:
         with pytest.raises(InvalidValueError, match=words):
             drive(robot, posts, DensityTracking(posts, motion))
         assert not robot.sent
+    quick, other = PositionTracking(posts.arm, motion, 0.002), FakeRobot(posts, Input.POSITION)
+    with pytest.raises(InvalidValueError, match=r"period of the controller = 0.002: must be the"):
+        drive(other, posts, quick)
     with pytest.raises(InvalidValueError, match="one with a method position"):
         drive(FakeRobot(posts, Input.POSITION), posts, DensityTracking(posts, motion))
 
