@@ -27,7 +27,7 @@ class FrankaRobot:
     with the largest s ≤ 1 by which no joint's torque changes by more than its rate allows in a
     millisecond, τ_J^d being what the robot acts by. Where torque changes faster the robot stops, by
     its reflex `controller_torque_discontinuity`. densarm's laws keep to the rate themselves, so
-    that s = 1 unless a packet was lost.
+    that s = 1 unless a packet was lost. τ_J keeps the torque limits too, as the robot wants it.
 
     Args:
         address: the robot's, or a simulator's.

@@ -130,6 +130,14 @@ def test_torque_changes_from_what_the_robot_acts_by_as_fast_as_it_bears(stands: 
     np.testing.assert_allclose(stand.sent[-1].tau_J, -wanted + wanted * 0.999 / 4.0)
 
 
+def test_what_is_sent_keeps_the_torque_limits_without_gravity_too(stands: Stands) -> None:
+    limit = ARM.limits.effort
+    stand = stands(acting=limit - 0.1)
+    FrankaRobot("fake", ARM).command(limit + np.abs(GRAVITY))
+    np.testing.assert_allclose(stand.sent[0].tau_J, limit, atol=0.1)
+    assert (np.array(stand.sent[0].tau_J) <= limit).all()
+
+
 def test_a_reflex_is_told_in_the_robots_words_in_one_line(stands: Stands) -> None:
     stand = stands()
     robot = FrankaRobot("fake", ARM)
