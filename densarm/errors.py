@@ -52,6 +52,10 @@ class SceneChangedError(DensarmError):
         )
 
 
+class RobotError(DensarmError):
+    """A robot that cannot be reached or driven, or that stopped by itself, in its own words."""
+
+
 class FileContentError(DensarmError):
     """A file that is not what its reader expects.
 

@@ -286,3 +286,11 @@ def test_pick_and_place(
     assert run.startswith("reached after ")
     assert run.endswith("certified: True")
     assert "passed over ways to goal 1: the line of 'panda_hand_tcp' along" in remark
+
+
+@pytest.mark.slow
+def test_own_robot(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    run_example(monkeypatch, "own_robot.py")
+    out = capsys.readouterr().out
+    assert out.startswith("reached in")
+    assert "not proved" not in out

@@ -36,10 +36,11 @@ def robot_description(robot: str | Path) -> RobotDescription:
     entry = read_toml(folder / "arm.toml")
     urdf, srdf = entry.pop("urdf"), entry.pop("srdf", None)
     entry["frames"] = own_frames(entry.pop("frames", {}))
+    text = read_text(resolve_path(urdf, folder))
     return RobotDescription(
         name=str(robot),
-        urdf=read_text(resolve_path(urdf, folder)),
+        urdf=text,
         srdf=None if srdf is None else read_text(resolve_path(srdf, folder)),
-        package_dirs=(DATA_WHEEL,) if DATA_WHEEL in urdf else (str(folder),),
+        package_dirs=(DATA_WHEEL,) if DATA_WHEEL in f"{urdf} {text}" else (str(folder),),
         **entry,
     )

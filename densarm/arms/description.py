@@ -46,11 +46,18 @@ class RobotDescription:
     torque_rate: Vector | float | None = None
     """Limits of the change of torque, but for gravity's, (nv,) or one for all [N·m/s or N/s]; None
     for none, as infinity."""
+    torque_rate_is_hard: bool = False
+    """Whether it holds in emergencies too, as an arm wants that else stops by itself."""
     jerk: Vector | float | None = None
     """Jerk limits (nv,), or one for all [rad/s³ or m/s³]; None for none, as infinity."""
     armature: Vector | float | None = None
     """Inertia of rotors, times their gears' ratios squared, (nv,) or one for all [kg·m² or kg];
     None for none."""
+    deceleration: Vector | float | None = None
+    """a of `JointLimits.fastest`, with which velocity limits fall towards position limits, (nv,) or
+    one for all [rad/s² or m/s²]; None for limits that do not fall."""
+    velocity_offset: Vector | float | None = None
+    """o there, the same [rad/s or m/s]; None for zero."""
     end_effector: str | None = None
     """Frame whose path is drawn; None for the last link."""
     postures: Mapping[str, Vector] = field(default_factory=dict)
@@ -112,7 +119,14 @@ class RobotDescription:
             raise DensarmError(f"robot description: {error}") from None
 
 
-PER_JOINT = ("acceleration", "torque_rate", "jerk", "armature")
+PER_JOINT = (
+    "acceleration",
+    "torque_rate",
+    "jerk",
+    "armature",
+    "deceleration",
+    "velocity_offset",
+)
 """Fields that hold one number per joint."""
 
 _ALWAYS_RECORDED = ("postures", "package_dirs", "base_placement", "acceleration")

@@ -22,6 +22,7 @@ DEFAULT_ACCELERATION = 10.0
 POSITION_TOLERANCE = 1e-9
 """By which a position, computed or rounded to digits, may exceed its limits [rad or m]."""
 
+_SLOWEST = 1e-9  # [rad/s or m/s], of a limit that falls to zero, so that all can be divided by it
 _UNLIMITED = 1e12  # URDFs write huge numbers where a joint has no limit
 _LINK_MARK = " (link)"
 
@@ -44,8 +45,33 @@ class JointLimits:
     torque_rate: Array
     """Limit of the change of torque, but for gravity's [N·m/s or N/s]; infinite where none is
     declared, and without masses."""
+    emergency_torque_rate: Array
+    """The same in emergencies: infinite but for arms that stop by themselves beyond the other."""
     jerk: Array
     """Jerk limit [rad/s³ or m/s³]; infinite where none is declared."""
+
+    deceleration: Array
+    """a of `fastest` [rad/s² or m/s²]; infinite where velocity limits do not fall."""
+    velocity_offset: Array
+    """o there [rad/s or m/s]."""
+
+    def fastest(self, angles: Array, towards: Array) -> Array:
+        r"""Return the velocity limits (..., nv) [rad/s or m/s], as they fall to position limits.
+
+        .. math:: \min\big( v^{max}, \sqrt{o^2 + 2 a d} - o \big)
+
+        Args:
+            angles: joint positions (..., nv).
+            towards: velocity or direction (..., nv), whose sign tells which limit is at d ahead.
+
+        Source: libfranka, `computeUpperLimitsJointVelocity`.
+        """
+        if np.isinf(self.deceleration).all():
+            return self.velocity
+        ahead = np.where(towards > 0.0, self.upper - angles, angles - self.lower)
+        offset, ahead = self.velocity_offset, np.maximum(ahead, 0.0)
+        falling = np.sqrt(offset**2 + 2.0 * self.deceleration * ahead) - offset
+        return np.minimum(self.velocity, np.maximum(falling, _SLOWEST))
 
     def excess(self, angles: Array) -> Array:
         """Return how far joint positions (..., nv) are outside their limits [rad or m], or < 0."""
@@ -59,11 +85,15 @@ def joint_limits(
 
     Without masses nothing tells what torque a motion takes, so that no torque is limited.
     """
-    limits = ("acceleration", "torque_rate", "jerk")
-    acceleration, torque_rate, jerk = (_given_limit(model, description, key) for key in limits)
+    limits = ("acceleration", "torque_rate", "jerk", "deceleration")
+    acceleration, torque_rate, jerk, deceleration = (
+        _given_limit(model, description, key) for key in limits
+    )
     joints = list(model.joints)[1:]
     index = [joint.idx_q for joint in joints]
     lower, upper = model.lowerPositionLimit[index], model.upperPositionLimit[index]
+    if not has_masses:
+        torque_rate = np.full(model.nv, np.inf)
     continuous = np.array([joint.nq == 2 for joint in joints])
     return JointLimits(
         lower=np.where(continuous | (lower <= -_UNLIMITED), -np.inf, lower),
@@ -71,17 +101,27 @@ def joint_limits(
         velocity=_limit_or_infinity(model.upperVelocityLimit),
         acceleration=np.where(np.isinf(acceleration), DEFAULT_ACCELERATION, acceleration),
         effort=_limit_or_infinity(has_masses * model.upperEffortLimit),
-        torque_rate=torque_rate if has_masses else np.full(model.nv, np.inf),
+        torque_rate=torque_rate,
+        emergency_torque_rate=torque_rate
+        if description.torque_rate_is_hard
+        else np.full(model.nv, np.inf),
         jerk=jerk,
+        deceleration=deceleration,
+        velocity_offset=_given_or_zero(model, description, "velocity_offset"),
     )
 
 
 def rotor_inertia(model: pin.Model, description: RobotDescription) -> Array:
     """Return the inertia of the joints' rotors (nv,) [kg·m² or kg]."""
-    if description.armature is None:
+    return _given_or_zero(model, description, "armature")
+
+
+def _given_or_zero(model: pin.Model, description: RobotDescription, key: str) -> Array:
+    """Return what a description has per joint (nv,), zero where it has none."""
+    if getattr(description, key) is None:
         return np.zeros(model.nv)
-    given = _per_joint(model, description, "armature")
-    non_negative("armature", given.min())
+    given = _per_joint(model, description, key)
+    non_negative(key, given.min())
     return given
 
 

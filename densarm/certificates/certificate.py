@@ -214,7 +214,7 @@ def _limits(task: Task, q: Array, v: Array, tau: Array) -> Check:
     arm, dt = task.arm, task.simulation.dt
     limits, angles = arm.limits, arm.angles(q)
     ratios = {
-        "velocity": np.abs(v) / limits.velocity,
+        "velocity": np.abs(v) / limits.fastest(angles, v),
         "acceleration": np.abs(np.diff(v, axis=0, append=v[-1:])) / dt / limits.acceleration,
     }
     if limited := task.input == Input.TORQUE and not arm.links_without_mass:

@@ -37,6 +37,9 @@ REACHED_VELOCITY = 0.01
 PLANTS = ("pinocchio", "mujoco")
 """Names of plants: the arm's model, or one of one's own; and what MuJoCo makes of an arm."""
 
+ROBOT = "robot"
+"""Stands for a plant in the record of what a real arm did."""
+
 _LARGE = 10.0  # longest side of a mesh that is worth a remark [m]
 
 FORMAT = 2
@@ -59,6 +62,8 @@ class Input(StrEnum):
     """Joint torques, by `Controller.torque`."""
     VELOCITY = "velocity"
     """Joint velocities, by `VelocityController.velocity`."""
+    POSITION = "position"
+    """Joint positions, by `PositionTracking.position`."""
 
 
 @documented
@@ -134,14 +139,14 @@ class Task:
     input: Input = Input.TORQUE
     """What the plant is told."""
     plant: str = PLANTS[0]
-    """What is driven: one of `PLANTS`."""
+    """What is driven: one of `PLANTS`, or `ROBOT`."""
     disturbances: Mapping[str, Any] = field(default_factory=dict)
     """How the plant differs from the model, `Disturbances.given`; empty where it does not."""
     settings: Mapping[str, Any] = field(default_factory=dict)
     """What else a scenario says, as JSON data: read by those who plan and control, kept here."""
 
     def __post_init__(self) -> None:
-        one_of("plant", self.plant, PLANTS)
+        one_of("plant", self.plant, (*PLANTS, ROBOT))
         if self.passive_speed is not None:
             positive("passive_speed", self.passive_speed)
         for key in ("start", "goal"):

@@ -28,7 +28,7 @@ from densarm.values.kernels import compiled, compiled_part
 BRAKE, ATTRACT, _BRAKE_TORQUE, _ATTRACT_TORQUE, _OFFSET = (N_ROWS + k for k in range(5))
 _ACCELERATION_LIMIT, EFFORT_LIMIT, RATE_LIMIT = N_ROWS + 5, N_ROWS + 6, N_ROWS + 7
 VELOCITY_LIMIT, INERTIA_FLOOR, _ZERO, TORQUE = N_ROWS + 8, N_ROWS + 9, N_ROWS + 10, N_ROWS + 11
-TORQUE_RATE = N_ROWS + 12
+TORQUE_RATE, EMERGENCY_RATE = N_ROWS + 12, N_ROWS + 13
 
 DynamicsArrays = tuple[Array, Array, Array, Array, Array, Array, NDArray[np.int64]]
 """M (upper triangle), H, gravity, rows, sent torques, numbers, and joint index: what kernels of
@@ -87,12 +87,13 @@ class InverseDynamics:
         self._period = period
         self._updates_kinematics = kinematics is None
         self._kinematics = kinematics or Kinematics(arm)
-        self.rows: Array = np.zeros((N_ROWS + 13 + arm.nv, arm.nv))
+        self.rows: Array = np.zeros((N_ROWS + 14 + arm.nv, arm.nv))
         self.rows[_ACCELERATION_LIMIT] = acceleration_limit
         self.rows[EFFORT_LIMIT] = arm.limits.effort
         self.rows[VELOCITY_LIMIT] = np.minimum(arm.limits.velocity, _FASTEST)
         self.rows[INERTIA_FLOOR] = actuation.inertia_floor
         self.rows[TORQUE_RATE], self.rows[RATE_LIMIT] = arm.limits.torque_rate, math.inf
+        self.rows[EMERGENCY_RATE] = arm.limits.emergency_torque_rate
         self._observer = observer = DisturbanceObserver(arm, period, actuation, self.rows)
         self.sent: Array = observer.sent
         mass, data = self._kinematics.mass_matrix, self._kinematics.data
@@ -110,8 +111,8 @@ class InverseDynamics:
     def update(self, t: float, q: Array, v: Array) -> float:
         """Compute M, H and gravity at the state, q (nq,) and v (nv,), at a time [s].
 
-        NaN for the time begins anew, and leaves rates unlimited. The time since the last update is
-        returned [s], a period where that is not known.
+        NaN for the time begins anew, with rates as in an emergency. Returned is the time since the
+        last update [s], a period where that is not known.
         """
         if self._updates_kinematics:
             self._kinematics.update(q)
@@ -190,11 +191,11 @@ class InverseDynamics:
     def send(self, tau: Array, *, is_emergency: bool = False) -> Array:
         """Return a torque (nv,) as far as its rate allows, and remember it as sent.
 
-        In an emergency its rate does not matter.
+        In an emergency its rate does not matter, but to arms on which the limit is hard.
         """
         self.rows[TORQUE] = tau
         if is_emergency:
-            self.rows[RATE_LIMIT] = math.inf
+            self.rows[RATE_LIMIT] = self.elapsed * self.rows[EMERGENCY_RATE]
         _send(self.arrays)
         return np.array(self.rows[TORQUE])
 
@@ -211,9 +212,8 @@ def take_in(t: float, q: Array, v: Array, arrays: DynamicsArrays) -> bool:
     terms = mass, nonlinear, gravity
     begins = observe(t, q, v, joint_index, terms, rows, sent, numbers)
     for i in range(v.size):
-        rows[RATE_LIMIT, i] = numbers[ELAPSED] * rows[TORQUE_RATE, i]
-        if math.isnan(t):
-            rows[RATE_LIMIT, i] = math.inf
+        kind = EMERGENCY_RATE if math.isnan(t) else TORQUE_RATE
+        rows[RATE_LIMIT, i] = numbers[ELAPSED] * rows[kind, i]
     return begins
 
 

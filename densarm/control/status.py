@@ -27,8 +27,14 @@ class Fault(StrEnum):
     """The controller failed, or gave a torque that is not finite or beyond the limits."""
     SCENE_CHANGED = "scene_changed"
     """The caller told that the scene is not that of the plan."""
+    ROBOT = "robot"
+    """The robot stopped by itself, or does not answer any more."""
     STOPPED = "stopped"
     """The caller asked for it."""
+
+
+TOLD = frozenset({Fault.NONE, Fault.ROBOT, Fault.SCENE_CHANGED, Fault.STOPPED})
+"""Those that do not pass by themselves."""
 
 
 @documented

@@ -18,7 +18,7 @@ from densarm.control.controller import (
 from densarm.control.course import Course
 from densarm.control.inverse_dynamics import InverseDynamics
 from densarm.control.state_observer import FARTHEST, ByPositions, StateObserver, Tolerances
-from densarm.control.status import Fault, Status, one_line
+from densarm.control.status import TOLD, Fault, Status, one_line
 from densarm.control.stopping import StopAndHold
 from densarm.planning.motion import Motion
 from densarm.values.arrays import Array
@@ -31,6 +31,7 @@ _FASTEST = 10.0  # of the velocity limits: beyond it a number is no velocity
 _UNLIMITED_FASTEST = 100.0  # [rad/s or m/s]
 _LONGEST_PREDICTION = 0.25  # [s]
 _SLOW = 0.01  # [rad/s or m/s], which counts as rest
+_WHY = "The caller asked to stop."
 
 
 class Supervisor(ToldByGoal):
@@ -59,9 +60,7 @@ class Supervisor(ToldByGoal):
     known moves the arm unseen, and an arm held upright falls in the end. Close mechanical brakes
     then (`needs_brakes`). Before the first state there is nothing to hold by, and the torque is
     zero. A state that stays the same while the arm rests, that drifts slower than `Tolerances`
-    allow, or another scene cannot be noticed from here: who watches these calls `stop` or
-    `scene_changed`. Between two calls nothing can be done: a torque is held until the next one
-    comes.
+    allow, or another scene is not noticed here: who watches these calls `stop` or `scene_changed`.
 
     Args:
         arm: the arm, as the plant is.
@@ -179,14 +178,15 @@ class Supervisor(ToldByGoal):
         stopped = self._knows_state and self.status.fault != Fault.NONE and not self.trusts_state
         return stopped and bool(np.abs(self._state[1]).max() <= _SLOW)  # a gentle stop ends later
 
-    def stop(self, why: str = "The caller asked to stop.", *, at_once: bool = False) -> None:
+    def stop(self, why: str = _WHY, *, at_once: bool = False, fault: Fault = Fault.STOPPED) -> None:
         """Brake from the next call of `torque` on, and hold still.
 
         Args:
-            why: for the status.
+            why: for the status, with the fault.
+            fault: what was found.
             at_once: along a straight line, even if the controller can pause on its motion.
         """
-        self._stop(Fault.STOPPED, why, pauses=not at_once)
+        self._stop(fault, why, pauses=not at_once)
 
     def scene_changed(self, how: str = "The scene has changed.") -> None:
         """Brake from the next call of `torque` on, hold still, and resume with a new plan only.
@@ -268,8 +268,7 @@ class Supervisor(ToldByGoal):
 
     def _resume_by_itself(self, dt: float) -> None:
         """Let the controller act again where the arm has rested for as long as the patience."""
-        was_told = self.status.fault in {Fault.NONE, Fault.STOPPED, Fault.SCENE_CHANGED}
-        rests = not was_told and self.is_at_rest and self.trusts_state
+        rests = self.status.fault not in TOLD and self.is_at_rest and self.trusts_state
         self._rested = self._rested + dt if rests else 0.0
         if self._rested >= self._patience:
             time = self._time

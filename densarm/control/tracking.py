@@ -20,6 +20,7 @@ from densarm.control.inverse_dynamics import (
     ATTRACT,
     BRAKE,
     EFFORT_LIMIT,
+    EMERGENCY_RATE,
     RATE_LIMIT,
     TORQUE,
     TORQUE_RATE,
@@ -150,7 +151,6 @@ class DensityTracking(ToldByGoal):
         self._evasion = evasion(world, self._pairs.pairs, motion.margin)
         self._dynamics = InverseDynamics(arm, unlimited, self._kinematics, motion.period, actuation)
         kappa = distance.kappa if isinstance(distance, TorusDistance) else math.nan
-        self._has_own_distance = math.isnan(kappa)
         self._numbers[_PERIOD:-2] = motion.period, actuation.delay, kappa
         self._numbers[-2:] = gains.position, gains.velocity
         self._sample = np.zeros((6, arm.nv))
@@ -174,7 +174,7 @@ class DensityTracking(ToldByGoal):
         q, v = checked_state(self._arm, q, v)
         self._kinematics.update(q)
         self._dynamics.compute_terms(q, v)
-        if self._has_own_distance:  # asked twice, since the first tells the reference's time
+        if math.isnan(self._numbers[_KAPPA]):  # asked twice, since the first tells σ
             self._act(float(t), q, v)
             ahead = self.reference_time + self._numbers[_DELAY] * self._numbers[RATE]
             self._dynamics.rows[ATTRACT] = self._attraction(q, self.motion.sample(ahead).position)
@@ -402,8 +402,8 @@ def _tracking_torque(
         numbers[EMERGENCY] += elapsed
     elif fastest > _PUSHED or largest < _RETURNED:
         numbers[EMERGENCY] = fastest > _PUSHED
-    if numbers[EMERGENCY] > 0.0:
-        rows[RATE_LIMIT] = math.inf
+    for i in range(n if numbers[EMERGENCY] > 0.0 else 0):
+        rows[RATE_LIMIT, i] = elapsed * rows[EMERGENCY_RATE, i]
     robust_torque(damping, elapsed, late, arrays)
     send(arrays)
     set_rate(largest, left, slowest, elapsed, numbers)

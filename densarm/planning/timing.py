@@ -96,13 +96,15 @@ def time_path(
     pieces = len(np.unique(path.knots)) - 1
     parts = math.ceil(np.clip(length / _GRID_STEP, *_GRID) / pieces)
     grid = np.linspace(0.0, 1.0, parts * pieces + 1)
-    slope = np.abs(path(grid, 1))
+    ways = path(grid, 1)
+    slope = np.abs(ways)
     travel = slope.mean(axis=0)
     shortest = _least_duration(arm, travel, parameters)
     unit = float(shortest.max() / np.clip(shortest.max(), *_DURATIONS))  # of time [s], to TOPP-RA
     topp_ra = ToppRa(arm, path, grid, unit, parameters)
     # No joint gets faster than √(a travel) from rest to rest, which TOPP-RA's solver does not see.
-    reached = np.minimum(arm.limits.velocity, 2.0 * np.sqrt(arm.limits.acceleration * travel))
+    fastest = arm.limits.fastest(path(grid), ways)
+    reached = np.minimum(fastest, 2.0 * np.sqrt(arm.limits.acceleration * travel))
     with np.errstate(divide="ignore", invalid="ignore"):
         cap = bounded(parameters.velocity_share * reached) / slope
     cap[slope == 0.0] = np.inf
@@ -349,7 +351,8 @@ def _shares(
         rise = np.diff(motion.position, axis=0) / period
         a = np.append(a, [(6.0 * rise - 4.0 * start - 2.0 * end) / period], axis=0)
     torque = torques(np.array([q] * len(a)), np.array([start] * len(a)), a)
-    used = np.abs(start) / (parameters.velocity_share * limits.velocity)
+    fastest = limits.fastest(motion.position[:-1], start)
+    used = np.abs(start) / (parameters.velocity_share * fastest)
     for rows, limit in (
         (a[:1], parameters.acceleration_share * limits.acceleration),
         (torque[:1], parameters.torque_share * limits.effort),

@@ -8,18 +8,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from densarm.arms.pose import Pose
-from densarm.certificates.task import (
-    PLANTS,
-    REACHED_POSITION,
-    REACHED_VELOCITY,
-    Input,
-    SimulationParameters,
-    Task,
-)
+from densarm.certificates.task import PLANTS, Input, SimulationParameters, Task
 from densarm.control.controller import Controller, VelocityController
-from densarm.density.pose_distance import PoseDistance
 from densarm.errors import InvalidValueError
 from densarm.simulation.disturbances import Disturbances, Signals
+from densarm.simulation.ending import Ending
 from densarm.simulation.plants import PinocchioPlant, Plant, SingleIntegrator
 from densarm.simulation.run import Run
 from densarm.values.arrays import Array
@@ -33,13 +26,7 @@ from densarm.world.world import World
 OnProgress = Callable[[str], None]
 """Told in a phrase what is being done."""
 
-REACHED_POSE = (1e-3, 0.01)
-"""Largest errors of a pose that is a goal [m, rad]."""
-
-_HELD_SHARE = 0.5  # the loop ends well inside the bound on position at the goal
-_STALL_MOTION = 0.01  # [rad or m] within the stall time
 _PROGRESS_INTERVAL = 200  # steps
-_NEAREST = 3  # pairs named where an arm rests
 
 
 def simulate(
@@ -178,8 +165,7 @@ class _Loop:
 
     def __post_init__(self) -> None:
         self._pairs = NearPairs(self.world)
-        self.to_pose = None if self.pose is None else PoseDistance(self.world.arm, self.pose)
-        self._goal_is_own = getattr(self.controller, "goal", None) is self.pose
+        self._ending = Ending(self.task, self.world, self.controller, self.pose)
 
     def run(self, on_progress: OnProgress) -> Run:
         task, p = self.task, self.task.simulation
@@ -187,9 +173,6 @@ class _Loop:
         if task.start_velocity is not None:
             v = task.start_velocity.copy()
         wanted: list[Array | None] = []
-        held, rest, rested_since = 0, q, 0
-        motion = getattr(self.controller, "motion", None)
-        moves_until = 0.0 if motion is None else motion.duration
         tracking_error: float | None = None
         outcome, detail = Outcome.TIMED_OUT, f"after {p.time_limit:.3g} s"
         self._record(q, v)
@@ -206,18 +189,11 @@ class _Loop:
             if touching := self._record(q, v):
                 outcome, detail = Outcome.COLLIDED, f"{touching} at t = {(k + 1) * p.dt:.3f} s"
                 break
-            held = held + 1 if self._is_at_goal(q, v) else 0
-            moves = getattr(self.controller, "is_moving", None)
-            moves = k * p.dt <= moves_until if moves is None else moves
-            if moves or self._distance(q, rest) > _STALL_MOTION:
-                rest, rested_since = q, k
-            if held * p.dt >= p.hold_time:
-                outcome, detail = Outcome.REACHED, ""
-                task = replace(task, goal=task.goal if self.to_pose is None else q)
-                break
-            has_goal = self.to_pose is not None or task.goal is not None
-            if has_goal and (k - rested_since) * p.dt >= p.stall_time:
-                outcome, detail = Outcome.STUCK, self._describe_rest(q)
+            if (ended := self._ending.after(k, q, v)) is not None:
+                outcome, is_reached = ended, ended == Outcome.REACHED
+                detail = "" if is_reached else self._ending.describe_rest(q)
+                if is_reached:
+                    task = replace(task, goal=self._ending.goal_reached(q))
                 break
             if k % _PROGRESS_INTERVAL == 0:
                 on_progress(f"running, {k * p.dt:.1f} s simulated")
@@ -265,33 +241,3 @@ class _Loop:
         if not told:
             return touching
         return f"{touching or told} ({told}, smallest distance {1e3 * distance:.3g} mm by coal)"
-
-    def _is_at_goal(self, q: Array, v: Array) -> bool:
-        if np.abs(v).max() > REACHED_VELOCITY:
-            return False
-        if self.to_pose is not None:
-            if self._goal_is_own and isinstance(now := getattr(self.controller, "goal", 0), Pose):
-                self.to_pose.set_pose(now)
-            position, turn = self.to_pose.off(q)
-            return max(position / REACHED_POSE[0], turn / REACHED_POSE[1]) <= _HELD_SHARE
-        return (
-            self.task.goal is not None
-            and self._distance(self.task.goal, q) <= _HELD_SHARE * REACHED_POSITION
-        )
-
-    def _distance(self, q_a: Array, q_b: Array) -> float:
-        """Return the largest difference of a joint [rad or m]."""
-        return float(np.abs(self.task.arm.difference(q_a, q_b)).max())
-
-    def _describe_rest(self, q: Array) -> str:
-        """Return why the arm rests at q (nq,) in the controller's words, or what is near there."""
-        own = getattr(self.controller, "describe_stall", None)
-        if own is not None and (told := str(own(q))):
-            return told
-        where = ", ".join(f"{angle:.4g}" for angle in self.task.arm.angles(q))
-        distance = self.world.distances(q)
-        nearest = ", ".join(
-            f"{' and '.join(self.world.pairs[k])} ({1e3 * distance[k]:.3g} mm)"
-            for k in np.argsort(distance)[:_NEAREST]
-        )
-        return f"at rest at joint positions ({where}); nearest there: {nearest or 'no pair'}"

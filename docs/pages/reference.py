@@ -9,9 +9,21 @@ _ALSO = {  # what public names take, return or hold, and nobody needs to import
     "arms": ["arms.description.RobotDescription", "arms.joints.JointLimits"],
     "world": ["world.world.ClearanceSample"],
     "planning": ["planning.motion.MotionSamples"],
-    "control": ["control.disturbance_observer.ActuationParameters"],
+    "control": [
+        "control.disturbance_observer.ActuationParameters",
+        "control.position_tracking.PositionTracking",
+    ],
     "certificates": ["certificates.certificate.Check", "certificates.task.Task"],
     "simulation": ["simulation.disturbances.Push"],
+    "hardware": [
+        "hardware.drive.drive",
+        "hardware.drive.DriveInterrupted",
+        "hardware.franka.FrankaRobot",
+        "hardware.robot.Reading",
+        "hardware.robot.Robot",
+        "hardware.universal.UniversalRobot",
+    ],
+    "errors": ["errors.RobotError"],
     "scenarios": ["scenarios.control.ControlParameters", "scenarios.control.ControlForm"],
 }
 _ROOMS = {
@@ -23,6 +35,7 @@ _ROOMS = {
     "control": "controllers, and what watches over them",
     "certificates": "what is proved of a run",
     "simulation": "plants, the closed loop and its record",
+    "hardware": "real robots, and the loop that drives them; named by its modules",
     "visualization": "pages, pictures and plots of a run",
     "scenarios": "a task as a whole",
     "values": "how a run ends",

@@ -81,3 +81,20 @@ def test_unknown_joint() -> None:
 def test_a_joint_that_is_gone_cannot_be_locked() -> None:
     with pytest.raises(UnknownNameError, match="joint to lock 'wrist'"):
         cut("right", locked_joints={"wrist": 0.0})
+
+
+def test_velocity_limits_fall_towards_the_position_limit_ahead_as_libfranka_has_them() -> None:
+    limits = load_arm("fr3").limits
+    # (upper limit, v, o, a) of joints 1 and 6, of libfranka's own description.
+    theirs = {0: (2.7501, 2.62, 0.30, 6.0), 5: (4.5205, 4.18, 0.35, 5.5)}
+    middle = 0.5 * (limits.lower + limits.upper)
+    for joint, (upper, v, o, a) in theirs.items():
+        for position in np.linspace(middle[joint], limits.upper[joint], 7):
+            angles = middle.copy()
+            angles[joint] = position
+            allowed = min(v, max(0.0, np.sqrt(2.0 * a * (upper - position)) - o))
+            found = limits.fastest(angles, np.ones(7))[joint]
+            assert found == pytest.approx(allowed, abs=2e-3)
+            assert limits.fastest(angles, -np.ones(7))[joint] == v  # away from the limit
+    panda = load_arm("panda").limits
+    assert panda.fastest(panda.upper, np.ones(7)) is panda.velocity

@@ -174,3 +174,17 @@ def test_without_a_time_no_rate_is_known(rated: Arm) -> None:
     dynamics = InverseDynamics(rated, rated.limits.acceleration)
     dynamics.update(math.nan, rated.configuration(np.zeros(rated.nv)), np.zeros(rated.nv))
     np.testing.assert_array_equal(dynamics.send(np.full(rated.nv, 11.0)), 11.0)
+
+
+def test_an_arm_that_stops_by_itself_beyond_its_torque_rate_keeps_it_in_an_emergency() -> None:
+    arm = load_arm("fr3")
+    dynamics, (q, v) = (
+        InverseDynamics(arm, arm.limits.acceleration),
+        (arm.postures["ready"], np.ones(7)),
+    )
+    for t in (0.0, 1e-3, 2e-3):
+        dynamics.update(t, q, v)
+        before = dynamics.sent[-1].copy()
+        sent = dynamics.send(-arm.limits.effort, is_emergency=True)
+    assert np.abs(sent - before).max() <= 1e-3 * arm.limits.torque_rate.max() * 1.001
+    assert np.abs(sent - before).max() > 0.5

@@ -302,3 +302,13 @@ def test_jerk_is_checked(value: float) -> None:
 def test_shares_are_checked(key: str, value: float) -> None:
     with pytest.raises(InvalidValueError, match=f"^{key} = "):
         TimingParameters(**{key: value})
+
+
+def test_a_motion_towards_a_position_limit_keeps_the_velocity_limits_as_they_fall() -> None:
+    arm = load_arm("fr3")
+    start = [0.0, -0.8, 0.0, -2.4, 0.0, 1.6, 0.8]
+    path = free_path(arm, [start, [2.6, 1.6, -2.8, -0.3, 2.7, 4.3, -2.9]])
+    motion = time_path(arm, path, 8.0, PERIOD, TimingParameters())
+    fastest = arm.limits.fastest(motion.position, motion.velocity)
+    assert (np.abs(motion.velocity) <= 0.95 * fastest * 1.001).all()
+    assert (fastest < arm.limits.velocity).any()

@@ -335,7 +335,7 @@ def test_a_plant_with_another_time_step_is_refused(free: World) -> None:
 def test_a_plant_of_an_unknown_input_is_refused(free: World, told: Any) -> None:
     plant = InPlace()
     plant.input = told
-    message = r"^input of the plant = .*: must be one of torque, velocity"
+    message = r"^input of the plant = .*: must be one of position, torque, velocity"
     with pytest.raises(InvalidValueError, match=message):
         simulate(
             free, LIMP, free.arm.postures["hanging"], plant=plant, parameters=Parameters(dt=0.01)
