@@ -208,9 +208,9 @@ def motionbenchmaker(problems: Path, every: int, **options: Any) -> None:
     default="density,damper_qp,stop_and_go",
     show_default=True,
     help="What gives way, separated by commas; also density_near, without looking ahead, "
-    "plan_again, which stops and plans around what is near, passive, which rests before anything of "
-    "the balls' speed can reach it, and, with their packages (pip install 'densarm[peers]'), mink "
-    "and cbfpy.",
+    "plan_again, which stops and plans around what is near, passive, which rests before anything "
+    "of the balls' speed can reach it, and, with their packages (pip install 'densarm[peers]'), "
+    "mink and cbfpy.",
 )
 @click.option("--resting", is_flag=True, help="The arm is to stay where it is.")
 @click.option(
