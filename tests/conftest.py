@@ -1,7 +1,9 @@
+import fcntl
 import os
 import shutil
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -71,6 +73,25 @@ def swing_up() -> Scenario:
 def swing_up_run(swing_up: Scenario) -> Run:
     """A certified run of swing_up."""
     return run(swing_up)
+
+
+@pytest.fixture(scope="session")
+def catalogue_run(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Run]:
+    """Return what gives the record of a scenario by its name, run by one worker for all."""
+    folder = tmp_path_factory.getbasetemp()
+    if "PYTEST_XDIST_WORKER" in os.environ:
+        folder = folder.parent
+
+    @cache
+    def ran(name: str) -> Run:
+        path = folder / f"{name}.npz"
+        with path.with_suffix(".lock").open("w") as lock:
+            fcntl.flock(lock, fcntl.LOCK_EX)
+            if not path.exists():
+                run(load_scenario(name)).save(path)
+        return Run.load(path)
+
+    return ran
 
 
 TCP = "panda_hand_tcp"
