@@ -42,9 +42,14 @@ settings.load_profile("densarm")
 
 @pytest.hookimpl(optionalhook=True)  # there may be no xdist
 def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
-    """Give a file's tests to one worker, so that its arms and runs are made once."""
+    """Give a file's tests to one worker, so that its arms and runs are made once.
+
+    In the order of their names one worker cuts arms into pieces while another compiles kernels; by
+    numbers of tests both would compile the same ones.
+    """
     from xdist.scheduler import LoadFileScheduling
 
+    config.option.loadscopereorder = False
     return LoadFileScheduling(config, log) if config.getvalue("dist") == "load" else None
 
 
