@@ -1,7 +1,9 @@
+import fcntl
 import os
 import shutil
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -38,6 +40,19 @@ settings.register_profile("densarm", deadline=None, max_examples=50, derandomize
 settings.load_profile("densarm")
 
 
+@pytest.hookimpl(optionalhook=True)  # there may be no xdist
+def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
+    """Give a file's tests to one worker, so that its arms and runs are made once.
+
+    In the order of their names one worker cuts arms into pieces while another compiles kernels; by
+    numbers of tests both would compile the same ones.
+    """
+    from xdist.scheduler import LoadFileScheduling
+
+    config.option.loadscopereorder = False
+    return LoadFileScheduling(config, log) if config.getvalue("dist") == "load" else None
+
+
 @pytest.fixture(scope="session")
 def chromium() -> str:
     """Path of a Chromium; without one the test is skipped, or fails where one is required."""
@@ -63,6 +78,25 @@ def swing_up() -> Scenario:
 def swing_up_run(swing_up: Scenario) -> Run:
     """A certified run of swing_up."""
     return run(swing_up)
+
+
+@pytest.fixture(scope="session")
+def catalogue_run(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Run]:
+    """Return what gives the record of a scenario by its name, run by one worker for all."""
+    folder = tmp_path_factory.getbasetemp()
+    if "PYTEST_XDIST_WORKER" in os.environ:
+        folder = folder.parent
+
+    @cache
+    def ran(name: str) -> Run:
+        path = folder / f"{name}.npz"
+        with path.with_suffix(".lock").open("w") as lock:
+            fcntl.flock(lock, fcntl.LOCK_EX)
+            if not path.exists():
+                run(load_scenario(name)).save(path)
+        return Run.load(path)
+
+    return ran
 
 
 TCP = "panda_hand_tcp"

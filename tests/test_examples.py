@@ -97,6 +97,7 @@ def test_free_body(
     assert {path.name for path in tmp_path.iterdir()} == {"free_body.html"}
 
 
+@pytest.mark.slow
 def test_own_urdf(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -226,6 +227,7 @@ def test_unknown_payload(
     np.testing.assert_allclose([float(torque) for torque in told], weight, atol=0.1)
 
 
+@pytest.mark.slow
 def test_moving_goal(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
     run_example(monkeypatch, "moving_goal.py")
     clearance, lags = (

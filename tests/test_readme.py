@@ -2,15 +2,18 @@
 
 import re
 import shlex
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 import click
 import pytest
 
+import densarm
 from densarm.cli import main
 from densarm.cli.application import application
 from densarm.scenarios.scenario import load_scenario
+from densarm.simulation.run import Run
 
 ROOT = Path(__file__).parents[1]
 README, COMMANDS = ROOT / "README.md", ROOT / "docs" / "commands.md"
@@ -73,8 +76,18 @@ def test_commands_in_the_text_of_the_readme() -> None:
 
 
 @pytest.mark.slow
-def test_python(capsys: pytest.CaptureFixture[str]) -> None:
+def test_python(
+    catalogue_run: Callable[[str], Run],
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
     """One block after the other, as somebody would type them."""
+
+    def run(name: str, **options: Any) -> Run:
+        return as_it_is(name, **options) if options else catalogue_run(name)
+
+    as_it_is = densarm.run
+    monkeypatch.setattr(densarm, "run", run)
     names: dict[str, object] = {}
     for k, program in enumerate(blocks(README, "python")):
         exec(compile(program, f"README.md, block {k + 1}", "exec"), names)

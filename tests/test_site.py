@@ -71,7 +71,7 @@ def test_keys_of_a_known_scenario_are_told_as_they_are() -> None:
 
 
 def test_there_are_tutorials() -> None:
-    assert len(NOTEBOOKS) >= 5
+    assert len(NOTEBOOKS) >= 8
 
 
 @pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)

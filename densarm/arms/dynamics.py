@@ -22,13 +22,22 @@ class Kinematics:
     def __init__(self, arm: Arm) -> None:
         self.model = arm.model
         self.data: pin.Data = arm.model.createData()
-        self.jacobian: Array = self.data.J.reshape(6, arm.nv)
-        self.mass_matrix: Array = self.data.M
+        self.jacobian = by_columns(self.data.J, (6, arm.nv))
+        self.mass_matrix = by_columns(self.data.M, (arm.nv, arm.nv))
         self.update(pin.neutral(arm.model))
 
     def update(self, q: Array) -> None:
         """Compute everything at q (nq,)."""
         pin.crba(self.model, self.data, q, pin.Convention.WORLD)
+
+
+def by_columns(matrix: Array, shape: tuple[int, int]) -> Array:
+    """Return a view of a matrix of Pinocchio, which it keeps by columns, as one of a shape.
+
+    Pinocchio drops the axis of a single joint; kernels know columns by their strides.
+    """
+    stride = matrix.itemsize * max(shape[0], 2)
+    return np.lib.stride_tricks.as_strided(matrix, shape, (matrix.itemsize, stride))
 
 
 class JointTorques:

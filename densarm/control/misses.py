@@ -6,6 +6,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
+from densarm.arms.dynamics import by_columns
 from densarm.values.arrays import Array
 from densarm.values.kernels import compiled, compiled_part, entry_point
 from densarm.world.active_pairs import ActivePairs, pair_motion
@@ -54,7 +55,7 @@ class MissesAhead:
         self._queries = PairQueries(arm.model, geometry, world.pair_shapes, remembers=False)
         self._places, self._came = shape_positions(self._queries.data), -1
         self._data = arm.model.createData()
-        self._jacobian = self._data.J.reshape(6, arm.nv)
+        self._jacobian = by_columns(self._data.J, (6, arm.nv))
         # Shapes of obstacles, and a pair of each; radii of balls about the frames of all shapes.
         self._bodies = np.array(np.unique(world.pair_shapes[:, 1], return_index=True)).T
         self._radius, self._there = np.zeros(geometry.ngeoms), np.zeros(arm.nv)

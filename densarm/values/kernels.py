@@ -60,10 +60,30 @@ def entry_point(kernel: Callable[..., Any], *arguments: object) -> Callable[...,
     if not isinstance(kernel, Dispatcher):  # compiling is switched off
         return kernel
     known: Any = kernel
-    signature = tuple(known.typeof_pyval(argument) for argument in arguments)
+    signature = tuple(_type_of(argument) for argument in arguments)
     known.compile(signature)
     entry: Callable[..., Any] = known.overloads[signature].entry_point
     return entry
+
+
+def _type_of(argument: object) -> Any:
+    """Return numba's type of an argument, of matrices by their strides.
+
+    A view of but one row or column lies in memory as a C array does. Numba would take it for one,
+    and compile a kernel anew for an arm of one joint, or a world of one pair.
+    """
+    known: Any = numba
+    if isinstance(argument, tuple):
+        parts = [_type_of(part) for part in argument]
+        return known.types.BaseTuple.from_types(parts, type(argument))
+    found = known.typeof(argument)
+    if not isinstance(argument, np.ndarray) or argument.ndim != 2:
+        return found
+    size = argument.itemsize
+    if argument.strides in ((size * argument.shape[1], size), (0, 0)):  # or new, and empty
+        return found.copy(layout="C")
+    by_columns = argument.flags.f_contiguous and argument.strides[0] == size
+    return found.copy(layout="F" if by_columns else "A")
 
 
 any_vector = np.zeros(4)[::2]

@@ -1,7 +1,7 @@
 """Bodies: named surfaces that move with the joints of an arm."""
 
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import product
@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 from densarm.arms.arm import Arm
 from densarm.scene.obstacles import geometry_objects
 from densarm.scene.scene import Scene
-from densarm.scene.shapes import box_hull, extreme_points
+from densarm.scene.shapes import extreme_points
 from densarm.values.arrays import Array
 from densarm.visualization.palette import BOARD, OBSTACLE, SENSING, Color
 from densarm.visualization.triangle_mesh import TriangleMesh, mesh_of, sphere_swept_hull
@@ -22,7 +22,7 @@ from densarm.visualization.triangle_mesh import TriangleMesh, mesh_of, sphere_sw
 WORLD = 0
 """Index of the joint that carries what does not move."""
 
-_BOARD_WIDTH, _BOARD_THICKNESS = 3.0, 0.01  # [m], of what is drawn of a half-space
+_BOARD_THICKNESS = 0.01  # [m], of what is drawn of a half-space
 
 
 @dataclass(frozen=True)
@@ -38,11 +38,6 @@ class Body:
     color: Color
     shape: coal.CollisionGeometry
     """What the mesh is the surface of."""
-
-    @property
-    def has_end(self) -> bool:
-        """Whether it is all there is of the shape, which a half-space's board is not."""
-        return not isinstance(self.shape, coal.Halfspace)
 
     def corners(self, joint_poses: Sequence[pin.SE3]) -> Array:
         """Return the bounding box's corners (8, 3) in the world [m], given the joints' poses."""
@@ -66,14 +61,25 @@ def arm_bodies(arm: Arm) -> tuple[Body, ...]:
 
 
 def obstacle_bodies(scene: Scene, origin: ArrayLike = (0.0, 0.0, 0.0)) -> tuple[Body, ...]:
-    """Return the obstacles, seen from a point (3,) [m], in the shapes that distances are of.
+    """Return the obstacles that have an end, seen from a point (3,) [m], as distances are of."""
+    return tuple(
+        _body(item, OBSTACLE)
+        for item in _items(scene, origin)
+        if not isinstance(item.geometry, coal.Halfspace)
+    )
 
-    A half-space is a thin board at the part of its surface nearest the origin.
+
+def half_space_bodies(
+    scene: Scene, middle: Array, width: float, origin: ArrayLike = (0.0, 0.0, 0.0)
+) -> tuple[Body, ...]:
+    """Return boards for half-spaces, square, of a width [m], where they are nearest a middle (3,).
+
+    The z axis of each points out of the half-space; its placement is on the surface.
     """
     return tuple(
-        _board(item) if isinstance(item.geometry, coal.Halfspace) else _body(item, OBSTACLE)
-        for obstacle in scene
-        for item in geometry_objects(obstacle, origin=origin)
+        _board(item, middle, width)
+        for item in _items(scene, origin)
+        if isinstance(item.geometry, coal.Halfspace)
     )
 
 
@@ -88,27 +94,46 @@ def spoken_names(arm: Arm, names: Iterable[str]) -> dict[str, str]:
     prefix = next(iter(links.values()), "").partition("_")[0] + "_"
     if all(re.match(rf"{re.escape(prefix)}[a-zA-Z]", link) for link in links.values()):
         links = {shape: link.removeprefix(prefix) for shape, link in links.items()}
-    spoken = {name: links.get(name, name).replace("_", " ") for name in names}
-    return {name: re.sub(r"(?<=[a-z])(?=\d)", " ", text) for name, text in spoken.items()}
+    links = {shape: _link_in_words(link) for shape, link in links.items()}
+    return {name: links.get(name, name.replace("_", " ")) for name in names}
+
+
+def _link_in_words(link: str) -> str:
+    """Return "left finger" for ``leftfinger``, "link 1" for ``link01``, "base" for ``link_base``.
+
+    A "forearm link" is a forearm, but an "upper link" is no "upper".
+    """
+    words = re.sub(r"^(left|right)(?=[a-z])", r"\1 ", link.replace("_", " "))
+    words = re.sub(r"(?<=[a-z])(?=[A-Z])", " ", words).lower()
+    words = re.sub(r"(?<=[a-z])0*(?=\d)", " ", words)
+    words = re.sub(r"^link (?=[a-z])", "", words)
+    return re.sub(r"(arm|base|shoulder|elbow|wrist|hand)( \d)? link$", r"\1\2", words)
 
 
 def sensing_bodies(obstacles: Sequence[Body], distance: float) -> tuple[Body, ...]:
-    """Return all that is within a distance [m] of each obstacle that has an end."""
+    """Return all that is within a distance [m] of each obstacle; none may be a half-space."""
     return tuple(
         replace(body, mesh=sphere_swept_hull(points, radius + distance), color=SENSING)
         for body in obstacles
-        if body.has_end
         for points, radius in [extreme_points(body.shape)]
     )
 
 
-def _board(item: pin.GeometryObject) -> Body:
+def _items(scene: Scene, origin: ArrayLike) -> Iterator[pin.GeometryObject]:
+    for obstacle in scene:
+        yield from geometry_objects(obstacle, origin=origin)
+
+
+def _board(item: pin.GeometryObject, middle: Array, width: float) -> Body:
     normal = item.placement.rotation @ item.geometry.n
-    surface = item.geometry.d + normal @ item.placement.translation
-    board = box_hull([_BOARD_WIDTH, _BOARD_WIDTH, _BOARD_THICKNESS])
+    above = normal @ (middle - item.placement.translation) - item.geometry.d
     turn = pin.Quaternion.FromTwoVectors(np.array([0.0, 0.0, 1.0]), normal).toRotationMatrix()
-    pose = pin.SE3(turn, (surface - 0.5 * _BOARD_THICKNESS) * normal)
-    return Body(item.name, WORLD, pose, mesh_of(board), BOARD, item.geometry)
+    corners = np.array(list(product((-0.5, 0.5), (-0.5, 0.5), (-1.0, 0.0))))
+    mesh = sphere_swept_hull(corners * [width, width, _BOARD_THICKNESS], 0.0)
+    mesh = replace(mesh, edges=mesh.edges[:0])  # which are not the half-space's
+    return Body(
+        item.name, WORLD, pin.SE3(turn, middle - above * normal), mesh, BOARD, item.geometry
+    )
 
 
 def _body(item: pin.GeometryObject, color: Color) -> Body:

@@ -1,6 +1,6 @@
 """Camera: where to look from so that given points fill the picture."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import product
 
@@ -9,7 +9,6 @@ import numpy as np
 import pinocchio as pin
 
 from densarm.values.arrays import Array
-from densarm.visualization.bodies import Body
 
 FIELD_OF_VIEW = 35.0
 """Vertical opening angle of the camera [deg]."""
@@ -20,6 +19,29 @@ _BEFORE = 0.1  # least depth of the nearest point, as a part of what the points 
 _SLANTS = ((1.0, 1.0, 0.7), (0.4, 1.0, 0.6), (1.0, 0.4, 0.6))  # in front, aside, above
 _SIDES = tuple(product((1.0, -1.0), (-1.0, 1.0)))  # signs of x and y, the usual ones first
 _SIGHT = 2e-3  # thickness of a line of sight [m]
+
+
+@dataclass(frozen=True)
+class Sight:
+    """A point that is to be seen, and what may stand before it."""
+
+    point: Array
+    """(3,), in the world frame [m]."""
+    before: Sequence[tuple[coal.CollisionGeometry, pin.SE3, float]]
+    """Shapes, their poses, and their opacities, 0 to 1."""
+
+    def visibility(self, eye: Array) -> float:
+        """Return how much of the point comes through to an eye (3,) [m], 0 to 1."""
+        way = eye - self.point
+        rotation = pin.Quaternion.FromTwoVectors(np.array([0.0, 0.0, 1.0]), way).matrix()
+        line = coal.Capsule(_SIGHT / 2.0, float(np.linalg.norm(way)))
+        at = coal.Transform3s(rotation, self.point + way / 2.0)
+        request, share = coal.CollisionRequest(), 1.0
+        for shape, pose, opacity in self.before:
+            place = coal.Transform3s(pose.rotation, pose.translation)
+            if coal.collide(line, at, shape, place, request, coal.CollisionResult()):
+                share *= 1.0 - opacity
+        return share
 
 
 @dataclass(frozen=True)
@@ -34,17 +56,18 @@ class Camera:
     offset: Array
 
     @classmethod
-    def facing(
-        cls, points: Array, watched: Iterable[Array] = (), obstacles: Sequence[Body] = ()
-    ) -> "Camera":
-        """Return a camera that sees points (N, 3) [m] and most of those watched, past obstacles.
+    def facing(cls, points: Array, watched: Sequence[Sight] = ()) -> "Camera":
+        """Return a camera that sees points (N, 3) [m], and those watched as well as can be.
 
         It looks along the directions in which the points extend least: straight at the plane of a
         planar arm, and from a corner at an arm that moves in space.
         """
         cameras = [cls._along(points, slant, side) for side in _SIDES for slant in _SLANTS]
-        return min(
-            cameras, key=lambda camera: sum(camera._is_hidden(at, obstacles) for at in watched)
+        return max(
+            cameras,
+            key=lambda camera: sum(
+                each.visibility(camera.target + camera.offset) for each in watched
+            ),
         )
 
     @property
@@ -71,16 +94,3 @@ class Camera:
         nearest = seen[:, 2].max() + _BEFORE * np.max(high - low)
         distance = max(float((from_right + from_left).max() / 2.0), float(nearest))
         return cls(target + aside @ camera.axes[:2], distance * camera.offset)
-
-    def _is_hidden(self, point: Array, obstacles: Sequence[Body]) -> bool:
-        sight = self.target + self.offset - point
-        length = float(np.linalg.norm(sight))
-        rotation = pin.Quaternion.FromTwoVectors(np.array([0.0, 0.0, 1.0]), sight).matrix()
-        line = coal.Capsule(_SIGHT / 2.0, length)
-        pose = coal.Transform3s(rotation, point + sight / 2.0)
-        request = coal.CollisionRequest()
-        for body in obstacles:
-            place = coal.Transform3s(body.placement.rotation, body.placement.translation)
-            if coal.collide(line, pose, body.shape, place, request, coal.CollisionResult()):
-                return True
-        return False

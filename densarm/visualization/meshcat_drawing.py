@@ -111,7 +111,7 @@ def _draw_body(
 
 
 def _draw_obstacles(viewer: meshcat.Visualizer, scene: RenderScene) -> None:
-    sensing = sensing_bodies(scene.obstacles, scene.sensing_distance)
+    sensing = sensing_bodies(scene.solids, scene.sensing_distance)
     for group, bodies, opacity in (
         ("obstacles", scene.obstacles, palette.OBSTACLE_OPACITY),
         ("sensing", sensing, palette.SENSING_OPACITY),

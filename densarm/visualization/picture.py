@@ -129,7 +129,7 @@ class Picture:
         raster.clear()
         robot, obstacles = self._posed(scene.q[k]), self._obstacles(k)
         raster.lines(scene.floor, palette.FLOOR, _FLOOR_WIDTH * self._line_scale, 1.0)
-        shadow = _shadow([robot, *obstacles], scene.floor[0, 0, 2])
+        shadow = _shadow([robot, *obstacles], scene.ground)
         raster.fill(shadow, _SHADOW_OPACITY)
         raster.fill(robot)
         if scene.path is not None:

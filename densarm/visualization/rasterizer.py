@@ -1,11 +1,13 @@
 """Rasterizer: triangles to pixels without a graphics card, by a depth buffer."""
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
 from densarm.errors import InvalidValueError
 from densarm.values.arrays import Array
-from densarm.values.kernels import compiled
+from densarm.values.kernels import compiled, compiled_part
 from densarm.visualization.camera import FIELD_OF_VIEW, Camera
 from densarm.visualization.palette import Color
 from densarm.visualization.triangle_mesh import TriangleMesh
@@ -98,33 +100,23 @@ class Rasterizer:
     def _draw(
         self, corners: Array, faces: NDArray[np.int64], colors: Array, opacity: float
     ) -> None:
+        values = np.column_stack([corners, colors])
         is_seen = np.isfinite(corners[:, 2])  # a corner behind the camera is NaN
         if not is_seen.all():
-            faces = faces[is_seen[faces].all(axis=1)]
+            faces, corners = faces[is_seen[faces].all(axis=1)], corners[is_seen]
         if len(faces) == 0:
             return
-        low, high = _rectangles(corners, faces, self._image.shape[1:])
-        values = np.column_stack([corners, colors])
         if opacity == 1.0:
-            _fill(values, faces, low, high, self._image)
+            _fill(values, faces, self._image)
             return
-        reach = tuple(map(slice, low.min(axis=0), high.max(axis=0)))
+        reach = tuple(
+            slice(int(np.clip(places.min(), 0, count)), int(np.clip(places.max() + 1, 0, count)))
+            for places, count in zip(corners.T[1::-1], self._image.shape[1:], strict=True)
+        )
         below, layer = self._image[:, *reach], self._layer[:, *reach]
         layer[0] = below[0]
-        _fill(values, faces, low, high, self._layer)
-        is_nearer = layer[0] > below[0]
-        for k in range(1, 4):
-            np.add(below[k], opacity * (layer[k] - below[k]), out=below[k], where=is_nearer)
-
-
-def _rectangles(
-    corners: Array, faces: NDArray[np.int64], size: tuple[int, ...]
-) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Return the first row and column of each triangle (M, 2), and those after the last."""
-    inside = np.clip(np.nan_to_num(corners[:, 1::-1]), 0.0, size)
-    pixels = np.ceil(inside - 0.5).astype(np.int64)
-    a, b, c = pixels.take(faces.T, axis=0)
-    return np.minimum(np.minimum(a, b), c), np.maximum(np.maximum(a, b), c)
+        _fill(values, faces, self._layer)
+        _blend(below, layer, opacity)
 
 
 def _reflected(normals: Array, lights: Array, to_camera: Array) -> tuple[Array, Array]:
@@ -145,31 +137,53 @@ def _reflected(normals: Array, lights: Array, to_camera: Array) -> tuple[Array, 
 
 
 @compiled
-def _fill(
-    corners: Array,
-    faces: NDArray[np.int64],
-    low: NDArray[np.int64],
-    high: NDArray[np.int64],
-    image: NDArray[np.float32],
-) -> None:
+def _fill(corners: Array, faces: NDArray[np.int64], image: NDArray[np.float32]) -> None:
     """Write nearness and colour of the nearest triangles into the image (4, rows, columns).
 
     Corners are column, row, nearness, red, green and blue (N, 6).
     """
+    rows, columns = image.shape[1], image.shape[2]
     for t in range(faces.shape[0]):
         a, b, c = corners[faces[t, 0]], corners[faces[t, 1]], corners[faces[t, 2]]
         bx, by = b[0] - a[0], b[1] - a[1]
         cx, cy = c[0] - a[0], c[1] - a[1]
-        area = bx * cy - by * cx
-        for row in range(low[t, 0], high[t, 0]):
+        inverse = 1.0 / (bx * cy - by * cx)
+        first, last = _samples(a[0], b[0], c[0], columns)
+        top, bottom = _samples(a[1], b[1], c[1], rows)
+        for row in range(top, bottom):
             y = row + 0.5 - a[1]
-            for column in range(low[t, 1], high[t, 1]):
+            for column in range(first, last):
                 x = column + 0.5 - a[0]
-                v = (x * cy - y * cx) / area
-                w = (bx * y - by * x) / area
+                v = (x * cy - y * cx) * inverse
+                w = (bx * y - by * x) * inverse
                 u = 1.0 - v - w
                 if u >= 0.0 and v >= 0.0 and w >= 0.0:  # nowhere if the area is zero
                     near = u * a[2] + v * b[2] + w * c[2]
                     if near > image[0, row, column]:
                         for k in range(4):
                             image[k, row, column] = u * a[2 + k] + v * b[2 + k] + w * c[2 + k]
+
+
+@compiled_part
+def _samples(a: float, b: float, c: float, count: int) -> tuple[int, int]:
+    """Return the first sample, of a count, between three places, and that after the last."""
+    low, high = a if a < b else b, b if a < b else a
+    low, high = c if c < low else low, c if c > high else high
+    return _sample(low, count), _sample(high, count)
+
+
+@compiled_part
+def _sample(x: float, count: int) -> int:
+    """Return the first sample whose middle is not before x, at most their count."""
+    return 0 if x <= 0.5 else count if x > count - 0.5 else math.ceil(x - 0.5)
+
+
+@compiled
+def _blend(below: NDArray[np.float32], layer: NDArray[np.float32], opacity: float) -> None:
+    """Mix the colours of a layer (4, rows, columns), where it is nearer, into those below it."""
+    for row in range(below.shape[1]):
+        for column in range(below.shape[2]):
+            if layer[0, row, column] > below[0, row, column]:
+                for k in range(1, 4):
+                    color = below[k, row, column]
+                    below[k, row, column] = color + opacity * (layer[k, row, column] - color)

@@ -14,15 +14,21 @@ from densarm.scene.scene import Scene
 from densarm.simulation.run import Run
 from densarm.values.arrays import Array
 from densarm.values.outcome import Outcome
-from densarm.visualization.bodies import Body, arm_bodies, obstacle_bodies
-from densarm.visualization.camera import Camera
-from densarm.visualization.palette import CARRIED, ClearanceScale
+from densarm.visualization.bodies import (
+    Body,
+    arm_bodies,
+    half_space_bodies,
+    obstacle_bodies,
+)
+from densarm.visualization.camera import Camera, Sight
+from densarm.visualization.palette import CARRIED, OBSTACLE_OPACITY, ClearanceScale
 from densarm.visualization.triangle_mesh import TriangleMesh, sphere_swept_hull, tube
 from densarm.world.world import NearestPair, World
 
 _FRAMES_PER_SECOND = 60.0
 _SAME = 1e-9  # [m], and of rotations
 _FLOOR_CELL = 0.25  # [m]
+_ABOVE = 1e-3  # of a grid's lines, so that boards do not cover them [m]
 _PATH_RADIUS = 0.006  # of the drawn end-effector path, as a part of the arm's extent
 _CLOSEST_RADIUS = 0.5  # of the closest pair's line, as a part of the path's
 _SHORTEST = 1e-6  # length of that line [m], so that it has a direction
@@ -69,7 +75,8 @@ class RenderScene:
         time: of the frames (N,), from 0 [s]; they are samples of the run.
         q: configuration at each frame (N, nq).
         robot: bodies of the arm.
-        obstacles: bodies of the scene, as it begins.
+        solids: bodies of the obstacles that have an end, as the scene begins.
+        obstacles: these, and a board for each half-space.
         obstacle_poses: of those that move, by name, the pose at each frame (N).
         sensing_distance: the largest distance at which obstacles act, the margin included [m].
         closest: the closest pair at each frame; empty where there are no pairs.
@@ -78,7 +85,9 @@ class RenderScene:
         scale: what the colours of the path mean.
         path: tube along the end effector's way; None if it hardly moves.
         line_radius: of the path's tube, a good width for other lines [m].
-        floor: ends of the lines of a grid (K, 2, 3) [m].
+        ground: height of the floor [m]: a half-space's, where one is below.
+        floor: ends of the lines of its grid, and of other half-spaces' (K, 2, 3) [m].
+        watched: the end effector at some frames, and what may stand before it.
         camera: where to look from.
     """
 
@@ -93,17 +102,20 @@ class RenderScene:
         nearest = _nearest(run, rows)
         self.closest = [replace(pair, points=pair.points - origin) for pair in nearest if pair]
         self.robot = arm_bodies(task.arm)
-        self.obstacles = obstacle_bodies(task.scene, origin)
+        self.solids = obstacle_bodies(task.scene, origin)
+        points = self._points_to_see()
+        middle, width = _extent(points)
+        boards = half_space_bodies(task.scene, middle, width, origin)
+        bodies = (*self.solids, *boards)
         if run.phases:
-            self.obstacle_poses = carried = _poses_in_phases(run, rows, self.obstacles)
-            self.obstacles = tuple(
+            self.obstacle_poses = carried = _poses_in_phases(run, rows, bodies)
+            self.solids = tuple(
                 replace(body, color=CARRIED) if body.name in carried else body
-                for body in self.obstacles
+                for body in self.solids
             )
         else:
-            times = run.time[rows]
-            self.obstacle_poses = _poses_in_motion(task.scene, self.obstacles, times, origin)
-        self._solid = [body for body in self.obstacles if body.has_end]
+            self.obstacle_poses = _poses_in_motion(task.scene, bodies, run.time[rows], origin)
+        self.obstacles = (*self.solids, *boards)
         self.sensing_distance = task.margin + task.sensing.distance
         self.clearance = np.array([pair.distance for pair in self.closest])
         self.scale = ClearanceScale.fitting(self.clearance)
@@ -112,10 +124,10 @@ class RenderScene:
         self.closest_line = closest_line(self.closest, _CLOSEST_RADIUS * self.line_radius)
         way = np.array([self._end_effector(q) for q in self.q])
         self.path = self._path(way)
-        points = self._points_to_see()
-        self.floor = _floor(points)
-        watched = way[np.linspace(0, len(way) - 1, _WATCHED_SAMPLES).astype(int)]
-        self.camera = Camera.facing(points, watched, self._solid)
+        self.ground, self.floor = _floor(middle, width, min(0.0, points[:, 2].min()), boards)
+        watched = np.unique(np.linspace(0, len(way) - 1, _WATCHED_SAMPLES).astype(int))
+        self.watched = [self._sight(way[k], k) for k in watched.tolist()]
+        self.camera = Camera.facing(points, self.watched)
 
     @property
     def joints(self) -> list[str]:
@@ -131,6 +143,20 @@ class RenderScene:
         frame = self._model.frames[self.run.task.arm.end_effector_frame]
         pose = self.joint_poses(q)[frame.parentJoint] * frame.placement
         return np.array(pose.translation)
+
+    def _sight(self, point: Array, k: int) -> Sight:
+        """Return the end effector's point at frame k, and what may stand before it."""
+        arm, poses = self.run.task.arm, self.joint_poses(self.q[k])
+        hand = self._model.subtrees[self._model.frames[arm.end_effector_frame].parentJoint]
+        before = [
+            (item.geometry, poses[item.parentJoint] * item.placement, 1.0)
+            for item in arm.collision_model.geometryObjects
+            if item.parentJoint not in hand and item.name not in arm.self_pieces
+        ]
+        for body in self.solids:
+            moved = self.obstacle_poses.get(body.name)
+            before.append((body.shape, moved[k] if moved else body.placement, OBSTACLE_OPACITY))
+        return Sight(point, before)
 
     def _path(self, way: Array) -> TriangleMesh | None:
         steps = [np.linalg.norm(after - before) for before, after in pairwise(way)]
@@ -149,11 +175,11 @@ class RenderScene:
         goal = self.run.task.goal
         poses = [self.joint_poses(q) for q in [*self.q[rows], *([] if goal is None else [goal])]]
         points = np.vstack([body.corners(pose) for pose in poses for body in self.robot])
-        if not self._solid:
+        if not self.solids:
             return points
         low, high = points.min(axis=0), points.max(axis=0)
         margin = _SURROUNDINGS * np.max(high - low)
-        corners = np.vstack([body.corners(poses[0]) for body in self._solid])
+        corners = np.vstack([body.corners(poses[0]) for body in self.solids])
         return np.vstack([points, np.clip(corners, low - margin, high + margin)])
 
 
@@ -240,17 +266,32 @@ def _key_rows(run: Run) -> NDArray[np.int64]:
     return np.unique([*np.searchsorted(run.time, frames), *others])
 
 
-def _floor(points: Array) -> Array:
-    """Return the lines of a grid below points (N, 3), somewhat wider than they are."""
+def _extent(points: Array) -> tuple[Array, float]:
+    """Return the middle (3,) and the width of a square floor for points (N, 3), in whole cells."""
     low, high = points.min(axis=0), points.max(axis=0)
-    middle = (low + high)[:2] / 2.0
-    half = np.max(high - low) / 2.0 + _FLOOR_CELL
-    first, last = (_FLOOR_CELL * np.round((middle + side * half) / _FLOOR_CELL) for side in (-1, 1))
-    z = min(0.0, low[2])
-    x, y = (np.arange(first[k], last[k] + _FLOOR_CELL / 2.0, _FLOOR_CELL) for k in range(2))
-    along_y = [[[at, y[0], z], [at, y[-1], z]] for at in x]
-    along_x = [[[x[0], at, z], [x[-1], at, z]] for at in y]
-    return np.array(along_y + along_x)
+    middle = np.array([*(_FLOOR_CELL * np.round((low + high)[:2] / 2.0 / _FLOOR_CELL)), low[2]])
+    cells = np.ceil(np.max(high - low) / 2.0 / _FLOOR_CELL) + 1.0
+    return middle, float(2.0 * _FLOOR_CELL * cells)
+
+
+def _floor(
+    middle: Array, width: float, height: float, boards: Sequence[Body]
+) -> tuple[float, Array]:
+    """Return the height of the floor and the lines of grids: at a height if no board is a floor."""
+    poses = [body.placement for body in boards]
+    heights = [pose.translation[2] for pose in poses if pose.rotation[2, 2] > 1.0 - _SAME]
+    if not heights:
+        poses.append(pin.SE3(np.eye(3), np.array([*middle[:2], height - _ABOVE])))
+    return max(heights, default=height), np.vstack([_grid(pose, width) for pose in poses])
+
+
+def _grid(pose: pin.SE3, width: float) -> Array:
+    """Return the lines (K, 2, 3) of a square grid about a pose, a little above it."""
+    at = np.linspace(-width / 2.0, width / 2.0, round(width / _FLOOR_CELL) + 1)
+    ends = np.tile([-width / 2.0, width / 2.0], (len(at), 1))
+    along_x = np.stack([ends, np.tile(at[:, np.newaxis], 2), np.full_like(ends, _ABOVE)], axis=-1)
+    lines = np.concatenate([along_x[..., [1, 0, 2]], along_x])
+    return np.asarray(lines @ pose.rotation.T + pose.translation)
 
 
 def _millimetres(length: float) -> str:

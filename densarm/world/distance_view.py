@@ -34,12 +34,15 @@ class DistanceView:
         strided = self._strided()
         self.is_direct = strided is not None
         """Whether `read` costs no copy."""
-        self._rows = np.zeros((len(self._results), _FIELDS)) if strided is None else strided
+        count = len(self._results)
+        self._copies = np.zeros((count + 1, 2 * _FIELDS))[:count, :_FIELDS]
+        self._rows = self._copies.view() if strided is None else strided
+        self._rows.flags.writeable = False  # alike, for kernels, however they are read
 
     def read(self) -> Array:
         """Return rows [distance, normal, point 1, point 2], shape (K, 10), of the last query."""
         if not self.is_direct:
-            self._rows[:] = self._by_getters(self._results)
+            self._copies[:] = self._by_getters(self._results)
         return self._rows
 
     def _strided(self) -> Array | None:
@@ -47,7 +50,7 @@ class DistanceView:
         if not count:
             return None
         first, some = self._address(0), np.unique(np.linspace(0, count - 1, _COMPARED).astype(int))
-        stride = self._address(1) - first if count > 1 else _FIELDS * 8
+        stride = self._address(1) - first if count > 1 else 2 * _FIELDS * 8
         even = all(self._address(k) - first == stride * k for k in some)
         if not even or stride < _FIELDS * 8 or stride % 8 != 0:
             return None

@@ -10,7 +10,7 @@ import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 
 from densarm.arms.arm import Arm
-from densarm.arms.dynamics import holding_ratios, holding_torque
+from densarm.arms.dynamics import by_columns, holding_ratios, holding_torque
 from densarm.arms.inverse_kinematics import InverseKinematics
 from densarm.arms.pose import Pose
 from densarm.errors import DensarmError, InvalidValueError
@@ -104,7 +104,7 @@ class World(ChangingObstacles):
         self._queries = PairQueries(arm.model, model, self.pair_shapes, remembers=True)
         self._geometry_data, self._data = self._queries.data, arm.model.createData()
         # A view that follows the data; Pinocchio drops the second axis of a single column.
-        self._jacobian = self._data.J.reshape(6, arm.nv)
+        self._jacobian = by_columns(self._data.J, (6, arm.nv))
         shapes = model.geometryObjects
         moves = joint_support(arm.model)[np.array([item.parentJoint for item in shapes], np.int64)]
         first, second = self.pair_shapes.T

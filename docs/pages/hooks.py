@@ -44,6 +44,7 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
         shown = list(pool.map(notebooks.page, tutorials))
     for notebook, (text, pictures) in zip(tutorials, shown, strict=True):
         pages[f"tutorials/{notebook.stem}.md"] = text
+        _sources[f"tutorials/{notebook.stem}.md"] = notebook.relative_to(ROOT).as_posix()
         for name, content in pictures.items():
             files.append(File.generated(config, f"tutorials/{name}", content=content))
     for name, text in pages.items():

@@ -39,7 +39,7 @@ def page(path: Path) -> tuple[str, dict[str, bytes]]:
         parts.append(f"```python\n{cell.source}\n```")
         for output in cell.outputs:
             parts.append(_shown(output, f"{path.stem}_{len(parts)}", pictures))
-    parts.append(f"[This page as a notebook]({path.name})")
+    parts.append(f'<a href="{path.name}">This page as a notebook</a>')
     return "\n\n".join(parts) + "\n", pictures
 
 

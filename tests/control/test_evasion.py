@@ -1,5 +1,6 @@
 """Evasion: rows that hold where they can, balls that miss, and scenes that stand."""
 
+from collections.abc import Callable
 from pathlib import Path
 
 import daqp
@@ -125,8 +126,10 @@ def test_the_same_ball_hits_an_arm_that_does_not_see_it(
 @pytest.mark.parametrize(
     ("scenario", "clearance"), [("panda_crossing", 0.012), ("panda_shared_table", 0.045)]
 )
-def test_scenarios_among_what_moves_are_certified(scenario: str, clearance: float) -> None:
-    run = densarm.run(scenario)
+def test_scenarios_among_what_moves_are_certified(
+    catalogue_run: Callable[[str], Run], scenario: str, clearance: float
+) -> None:
+    run = catalogue_run(scenario)
     assert (run.outcome, run.detail, run.replanned_at) == (Outcome.REACHED, "", ())
     assert run.clearance.min() > clearance
     assert run.certified

@@ -414,6 +414,7 @@ class Following:
         return self.regulation.torque(t, q, v)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("every", [0.001, 1.0 / 30.0])
 def test_a_goal_that_moves_is_followed_without_a_lag(every: float) -> None:
     world = World(load_arm("ur5", shapes="capsule"), Scene())

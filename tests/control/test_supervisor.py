@@ -22,7 +22,6 @@ from densarm.control.tracking import DensityTracking
 from densarm.errors import InvalidValueError
 from densarm.planning.motion import Motion
 from densarm.planning.plan import plan_motion
-from densarm.scenarios.run import run
 from densarm.scenarios.scenario import Scenario, load_scenario
 from densarm.simulation.disturbances import Disturbances, Push
 from densarm.simulation.plants import PinocchioPlant
@@ -466,11 +465,8 @@ class Recorded:
 
 
 @pytest.fixture(scope="module", params=["swing_up", "panda_table", "panda_shelf"])
-def recorded(request: pytest.FixtureRequest) -> Run:
-    if request.param == "swing_up":
-        shared: Run = request.getfixturevalue("swing_up_run")
-        return shared
-    return run(load_scenario(request.param))
+def recorded(request: pytest.FixtureRequest, catalogue_run: Callable[[str], Run]) -> Run:
+    return catalogue_run(request.param)
 
 
 def stopped(recorded: Run, begin: int) -> tuple[Array, Array, Array]:

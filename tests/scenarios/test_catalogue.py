@@ -1,5 +1,6 @@
 """What every scenario of the catalogue keeps to."""
 
+from collections.abc import Callable
 from functools import cache
 
 import numpy as np
@@ -10,7 +11,6 @@ from densarm.arms.catalogue import scenario_paths
 from densarm.certificates.phases import body_poses
 from densarm.cli.list_known import list_known
 from densarm.scenarios.control import ControlForm
-from densarm.scenarios.run import run
 from densarm.scenarios.scenario import Scenario, load_scenario
 from densarm.simulation.run import Run
 from densarm.values.outcome import Outcome
@@ -19,11 +19,6 @@ from densarm.world.swept_check import SweptCheck
 pytestmark = pytest.mark.slow
 
 loaded = cache(load_scenario)
-
-
-@cache
-def ran(name: str) -> Run:
-    return run(loaded(name))
 
 
 @cache
@@ -74,11 +69,13 @@ def test_it_is_listed_with_its_robot_joints_and_pairs(scenario: Scenario) -> Non
 
 
 @pytest.mark.parametrize("name", scenario_paths())
-def test_a_real_arm_would_accept_its_torques(name: str) -> None:
+def test_a_real_arm_would_accept_its_torques(
+    catalogue_run: Callable[[str], Run], name: str
+) -> None:
     """Without gravity they change by 1 N·m per ms at most, from what holds the arm at first."""
     if loaded(name).world.fastest_obstacle > 0.0:
         pytest.skip("evades what moves")
-    done = ran(name)
+    done = catalogue_run(name)
     for part in done.phases or (done,):
         arm = part.task.arm
         held = np.array([arm.nonlinear_effects(q, np.zeros(arm.nv)) for q in part.q])
@@ -86,17 +83,17 @@ def test_a_real_arm_would_accept_its_torques(name: str) -> None:
         assert np.abs(np.diff(free, axis=0)).max() <= 1e3 * done.task.simulation.dt + 1e-6
 
 
-def test_kinova_goes_the_short_way_round() -> None:
+def test_kinova_goes_the_short_way_round(catalogue_run: Callable[[str], Run]) -> None:
     scenario = loaded("kinova_posts")
     arm = scenario.arm
     step = arm.difference(scenario.start, scenario.goal)
     assert abs(arm.angles(scenario.start)[0] + step[0]) > 3.15
-    done = ran("kinova_posts")
+    done = catalogue_run("kinova_posts")
     assert (done.outcome, done.certified) == (Outcome.REACHED, True), done.detail
 
 
-def test_a_part_is_carried_out_of_a_bin() -> None:
-    done = ran("ur5_bin")
+def test_a_part_is_carried_out_of_a_bin(catalogue_run: Callable[[str], Run]) -> None:
+    done = catalogue_run("ur5_bin")
     assert (done.outcome, done.certified) == (Outcome.REACHED, True), done.detail
 
 
@@ -108,9 +105,13 @@ def test_a_part_is_carried_out_of_a_bin() -> None:
     ],
 )
 def test_what_is_picked_is_put_where_it_belongs(
-    name: str, into: str, half: tuple[float, ...], bodies: tuple[str, ...]
+    catalogue_run: Callable[[str], Run],
+    name: str,
+    into: str,
+    half: tuple[float, ...],
+    bodies: tuple[str, ...],
 ) -> None:
-    done = ran(name)
+    done = catalogue_run(name)
     assert (done.outcome, done.certified) == (Outcome.REACHED, True), done.detail
     last = done.phases[-1]
     where = {key: pose for key, (_, pose) in body_poses(last.task, last.q[-1]).items()}
@@ -118,7 +119,7 @@ def test_what_is_picked_is_put_where_it_belongs(
         assert (np.abs(where[into].actInv(where[body].translation)) <= half).all()
 
 
-def test_the_second_grasp_in_the_corner_of_a_bin() -> None:
-    remark = ran("ur5_bin_pick").remark
+def test_the_second_grasp_in_the_corner_of_a_bin(catalogue_run: Callable[[str], Run]) -> None:
+    remark = catalogue_run("ur5_bin_pick").remark
     assert "passed over ways to goal 1: the line of 'cup' by (0, 0, -0.2) m is blocked" in remark
     assert "wrist_3_link_0 and bin_right overlap by" in remark

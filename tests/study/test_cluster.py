@@ -3,7 +3,6 @@
 import os
 import socket
 import sys
-import time
 from pathlib import Path
 
 import pytest
@@ -46,11 +45,9 @@ SLOW = pytest.param("tcp://127.0.0.1:9", marks=pytest.mark.slow)
 
 @pytest.mark.parametrize("address", [SLOW, "nonsense", "foo://127.0.0.1:9"])
 def test_no_scheduler(address: str) -> None:
-    began = time.perf_counter()
     with pytest.raises(InvalidValueError, match="must be the address of a Dask scheduler") as told:
         list(as_completed(eval, ["1"], scheduler=address))
     assert "\n" not in str(told.value)
-    assert time.perf_counter() - began < 8.0
 
 
 @pytest.mark.slow

@@ -12,29 +12,30 @@ from densarm.scene.scene import Attachment, Scene
 from densarm.visualization.bodies import (
     WORLD,
     arm_bodies,
+    half_space_bodies,
     obstacle_bodies,
-    sensing_bodies,
     spoken_names,
 )
 
 TETRAHEDRON = ((0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
 
-def test_half_space_is_a_board_below_its_surface() -> None:
+def test_half_space_is_a_board_below_its_surface_next_to_what_is_seen() -> None:
     wall = HalfSpace(name="wall", normal=(2.0, 0.0, 0.0), offset=-0.3, position=(1.0, 5.0, 5.0))
-    (board,) = obstacle_bodies(Scene([wall]))
+    scene, middle = Scene([wall]), np.array([2.0, 3.0, 1.0])
+    (board,) = half_space_bodies(scene, middle, 4.0)
     corners = board.mesh.vertices @ board.placement.rotation.T + board.placement.translation
     low, high = corners.min(axis=0), corners.max(axis=0)
     assert high[0] == pytest.approx(0.7)
-    assert (high - low)[1:].min() > 100 * (high - low)[0]
-    assert not board.has_end
-    assert sensing_bodies([board], 0.1) == ()
+    np.testing.assert_allclose((low + high)[1:] / 2.0, middle[1:])
+    np.testing.assert_allclose((high - low)[1:], 4.0)
+    assert obstacle_bodies(scene) == ()
 
 
 def test_each_piece_of_a_mesh_is_drawn() -> None:
     pieces = obstacle_bodies(Scene([Mesh(name="mug", pieces=(TETRAHEDRON, TETRAHEDRON))]))
     assert [piece.name for piece in pieces] == ["mug.0", "mug.1"]
-    assert all(piece.joint == WORLD and piece.has_end for piece in pieces)
+    assert all(piece.joint == WORLD for piece in pieces)
 
 
 def test_held_body_moves_with_its_link(two_link: Arm) -> None:
@@ -53,9 +54,12 @@ def test_held_body_moves_with_its_link(two_link: Arm) -> None:
     [
         ("kinova", "j2s6s200_link_4_0", "link 4"),
         ("panda", "panda_link5_0", "link 5"),
-        ("panda", "panda_leftfinger_3", "leftfinger"),
-        ("ur5", "wrist_1_link_0", "wrist 1 link"),
-        ("ur5", "forearm_link_0.3", "forearm link"),
+        ("panda", "panda_leftfinger_3", "left finger"),
+        ("ur5", "wrist_1_link_0", "wrist 1"),
+        ("ur5", "forearm_link_0.3", "forearm"),
+        ("xarm7", "link_base_0", "base"),
+        ("z1", "gripperMover_0.1", "gripper mover"),
+        ("z1", "link04_0", "link 4"),
         ("xarm7", "link4_0.2", "link 4"),
         ("two_link", "upper_link_0", "upper link"),
         ("two_link", "left_ball", "left ball"),

@@ -1,14 +1,13 @@
+import coal
 import numpy as np
+import pinocchio as pin
 import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from numpy.typing import NDArray
 
-from densarm.scene.obstacles import Box
-from densarm.scene.scene import Scene
-from densarm.visualization.bodies import obstacle_bodies
-from densarm.visualization.camera import FIELD_OF_VIEW, Camera
+from densarm.visualization.camera import FIELD_OF_VIEW, Camera, Sight
 
 POINTS = arrays(np.float64, st.tuples(st.integers(2, 12), st.just(3)), elements=st.floats(-5, 5))
 
@@ -37,14 +36,22 @@ def test_planar_arm_is_seen_from_the_front() -> None:
 
 
 @pytest.mark.parametrize("side", [-1.0, 1.0])
-def test_camera_looks_past_a_wall(side: float) -> None:
+@pytest.mark.parametrize("opacity", [0.5, 1.0])
+def test_camera_looks_past_a_wall(side: float, opacity: float) -> None:
     cloud = np.array([[x, y, z] for x in (0.0, 1.0) for y in (0.0, 1.0) for z in (0.0, 1.0)])
-    wall = Box(name="wall", size=(4.0, 0.05, 4.0), position=(0.5, 0.5 + side, 0.5))
-    camera = Camera.facing(cloud, cloud, obstacle_bodies(Scene([wall])))
+    wall, pose = coal.Box(4.0, 0.05, 4.0), pin.SE3(np.eye(3), np.array([0.5, 0.5 + side, 0.5]))
+    camera = Camera.facing(cloud, [Sight(point, [(wall, pose, opacity)]) for point in cloud])
     eye = camera.target + camera.offset
-    share = (wall.position[1] - cloud[:, 1:2]) / (eye - cloud)[:, 1:2]
+    share = (pose.translation[1] - cloud[:, 1:2]) / (eye - cloud)[:, 1:2]
     crossing = (cloud + share * (eye - cloud))[:, [0, 2]]
     is_hidden = (
         (share[:, 0] > 0.0) & (share[:, 0] < 1.0) & (np.abs(crossing - 0.5) < 2.0).all(axis=1)
     )
     assert not is_hidden.any()
+
+
+def test_bodies_one_behind_the_other_let_through_less() -> None:
+    plate = coal.Box(1.0, 0.1, 1.0)
+    places = [pin.SE3(np.eye(3), np.array([x, y, 0.0])) for x, y in ((0, 1), (0, 2), (5, 3))]
+    sight = Sight(np.zeros(3), [(plate, place, 0.25) for place in places])
+    assert sight.visibility(np.array([0.0, 9.0, 0.0])) == pytest.approx(0.75**2)

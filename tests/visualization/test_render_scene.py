@@ -66,8 +66,8 @@ def test_motion_without_pairs_has_a_path(swing: Run) -> None:
 def test_sensing_region_is_wider_than_its_obstacle_by_the_sensing_distance(
     scene: RenderScene,
 ) -> None:
-    sensing = sensing_bodies(scene.obstacles, scene.sensing_distance)
-    for obstacle, region in zip(scene.obstacles, sensing, strict=True):
+    sensing = sensing_bodies(scene.solids, scene.sensing_distance)
+    for obstacle, region in zip(scene.solids, sensing, strict=True):
         assert region.name == obstacle.name
         wider = np.ptp(region.mesh.vertices, axis=0) - np.ptp(obstacle.mesh.vertices, axis=0)
         np.testing.assert_allclose(wider, 2.0 * scene.sensing_distance, atol=5e-3)
@@ -91,6 +91,32 @@ def test_camera_does_not_step_back_for_a_half_space(resting: Run) -> None:
     ]
     np.testing.assert_array_equal(cameras[0].offset, cameras[1].offset)
     np.testing.assert_array_equal(cameras[0].target, cameras[1].target)
+
+
+def test_half_space_below_is_the_floor_and_others_have_a_grid(resting: Run) -> None:
+    wall = HalfSpace(name="wall", normal=(0.0, 1.0, 0.0), offset=-3.0)
+    for around in (
+        [HalfSpace(name="floor", offset=-2.5)],
+        [HalfSpace(name="floor", offset=-2.5), wall],
+    ):
+        task = replace(resting.task, scene=Scene(around))
+        scene = RenderScene(replace(resting, task=task))
+        assert scene.ground == -2.5
+        planes = [scene.floor[..., 2] + 2.5, scene.floor[..., 1] + 3.0][: len(around)]
+        on_one = np.min(np.abs(planes), axis=0)
+        assert on_one.max() < 2e-3
+        assert all((np.abs(plane).max(axis=1) < 2e-3).sum() > 4 for plane in planes)
+
+
+@pytest.mark.slow
+def test_camera_sees_the_hand_past_the_arm(resting: Run) -> None:
+    arm = load_arm("xarm7")
+    q = arm.configuration([0.011, 0.740, 0.406, 1.217, 0.197, -0.879, -0.331])
+    task = replace(resting.task, arm=arm, start=q, goal=q)
+    row = np.zeros((1, arm.nv))
+    scene = RenderScene(replace(resting, task=task, q=q[np.newaxis], v=row, tau=row))
+    (sight,) = scene.watched
+    assert sight.visibility(scene.camera.target + scene.camera.offset) == 1.0
 
 
 @pytest.mark.slow

@@ -56,7 +56,10 @@ def test_distances_in_map_coordinates(far: float) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("far", FAR)
 def test_runs_in_map_coordinates_are_certified(far: float) -> None:
-    """Replayed about a point 1 km off, states would differ by 2e-9."""
+    """Replayed about a point 1 km off, states would differ by 2e-9.
+
+    Roundings there differ from those at the origin, and may lead the plan by a way of its own.
+    """
     scenario, there = load_scenario("panda_table"), np.array([far, far, 0.0])
     description = replace(
         scenario.arm.description, base_placement=(far, far, 0.0, 0.0, 0.0, 0.0, 1.0)
@@ -64,8 +67,9 @@ def test_runs_in_map_coordinates_are_certified(far: float) -> None:
     moved = [replace(item, position=there + item.position) for item in scenario.scene]
     result = run(replace(scenario, arm=Arm(description), scene=Scene(moved)))
     assert result.certified
-    before = run(scenario)
-    assert result.clearance.min() == pytest.approx(before.clearance.min(), abs=1e-6)
+    for k in np.linspace(0, len(result.time) - 1, 50).astype(int):
+        here = scenario.world.distances(result.q[k]).min()
+        assert result.clearance[k] == pytest.approx(here, abs=1e-9)
 
 
 def test_a_urdf_that_begins_far_away(single_link: Callable[..., Arm]) -> None:
