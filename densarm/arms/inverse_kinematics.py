@@ -31,6 +31,7 @@ _LONGEST_STEP = 1.0  # [rad or m] of a joint
 _STEPS = 40  # from one start at most
 _PATIENCE = 8  # steps, in which the error must halve
 _EXACT = 1e-7  # [rad, or _LENGTH], error at which a pose is reached
+_CLOSE = 3e-5  # where no step leads nearer: of five joints whose axes are parallel but for rounding
 _PULLS = 30  # steps towards the configuration to be near to, at most
 _PULL = 0.5  # share of the way there that a step would go
 _PULLED = 1e-3  # [rad or m] of a joint, a pull that gains nothing
@@ -74,7 +75,7 @@ class InverseKinematics:
         """Return, as a phrase, how far the nearest to the pose is that can be reached."""
         alone = Pose(self._pose.frame, self._pose.position)
         position, _ = self._nearest(_target(self._arm, alone))
-        if position > _LENGTH * _EXACT:
+        if position > _LENGTH * _CLOSE:
             unit = "; positions are in metres" if np.abs(self._pose.position).max() > _FAR else ""
             return f"is out of reach: the nearest found is {position:.3g} m off{unit}"
         position, turn = self._nearest(self._target)
@@ -208,7 +209,7 @@ def solve(arm: Mechanism, goal: Target, starts: Array, first: int, near: Array, 
             if error < _EXACT or waited > _PATIENCE:
                 break
             _advance(arm, angles, near, 0.0, error, work)
-        if not error < _EXACT:
+        if not error < _CLOSE:
             continue
         for j in range(nv):
             out[0, j] = out[1, j] = angles[j]

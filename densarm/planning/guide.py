@@ -59,6 +59,11 @@ class PlanningParameters:
     solutions: int = 8
     """Configurations at most, by inverse kinematics, that stand for a pose."""
 
+    effort: int | None = None
+    """Ways by the planner at most of which a motion takes the quickest, rounded where that makes it
+    quicker; 1 for the guide's own way. None for 1 to a single configuration, and 6 where any of
+    several will do, as for a pose. The guides "density" and "direct", and one's own, have one."""
+
     def __post_init__(self) -> None:
         non_negative_integer("vias", self.vias)
         positive_integer("goals", self.goals)
@@ -69,7 +74,9 @@ class PlanningParameters:
         positive("near_distance", self.near_distance)
         positive_integer("searches", self.searches)
         positive("extension", self.extension)
-        positive_integer("shortcuts", self.shortcuts)
+        non_negative_integer("shortcuts", self.shortcuts)
+        if self.effort is not None:
+            positive_integer("effort", self.effort)
         non_negative("limit_margin", self.limit_margin)
 
 
@@ -101,6 +108,8 @@ class PlannedPath:
     """The goal that it leads to (nq,)."""
     cost: float
     """What the way costs, as `way_cost` has it [s]."""
+    is_rounded: bool = False
+    """Whether it is of points close to each other, bent evenly where that makes it quicker."""
 
 
 class Guide(Protocol):

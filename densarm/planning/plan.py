@@ -3,6 +3,7 @@
 import math
 import time
 from dataclasses import replace
+from functools import partial
 from itertools import pairwise
 
 import numpy as np
@@ -21,6 +22,7 @@ from densarm.planning.goals import Goal, candidates, goal_list, plan_to_any, way
 from densarm.planning.guide import Guide, NoPath, PlannedPath, PlanningParameters
 from densarm.planning.motion import Motion, PlanningError, TimingParameters
 from densarm.planning.path_guide import PathGuide
+from densarm.planning.portfolio import Ends, quickest_way
 from densarm.planning.shortening import shortened
 from densarm.planning.straight import straight_way
 from densarm.values.arrays import Array
@@ -46,6 +48,8 @@ The larger, the closer to obstacles ρ leads, and the fewer its spurious maxima:
 takes 1 to 10.
 """
 
+_EFFORT = 6  # ways that are looked for where any of several goals will do
+
 _LIMIT_INSET = 0.002  # [rad or m] from position limits at which a motion leaves and arrives
 
 # Shares of the path margin and of the planner's iterations, tried in turn: most spaces are wide,
@@ -53,6 +57,8 @@ _LIMIT_INSET = 0.002  # [rad or m] from position limits at which a motion leaves
 # that are draw samples near both ends above all. Under all margins but the last half of the
 # searches are made: what they do not find rather needs a smaller margin than more samples.
 _ATTEMPTS = ((1.0, 0.02), (0.25, 1.0), (0.05, 1.0))
+
+_EVEN_SHARE = 0.995  # of the limits at grid points of a path that bends evenly
 
 _AT_GOAL = 1e-7  # [rad or m]; a shorter way is left to feedback, for rounding shapes its curve
 
@@ -89,10 +95,11 @@ def plan_motion(
     Args:
         world: the arm among obstacles.
         start: configuration (nq,).
-        goal: configuration (nq,), pose, or a list of these, of which any will do. The density leads
-            to the `search.goals` nearest of them and of the poses' configurations, unless a
-            straight way would cost more than what was found; the least cost is what counts. Or a
-            `Line`, which a frame follows within 0.25 mm and 2.5 mrad, whatever the guide.
+        goal: configuration (nq,), pose, or a list of these, of which any will do. The planner leads
+            to the `search.goals` soonest reached of them and of the poses' configurations, and the
+            quickest of `search.effort` ways is taken; with an effort of 1, or where the planner
+            finds none, the density leads, and the least cost is what counts. Or a `Line`, which a
+            frame follows within 0.25 mm and 2.5 mrad, whatever the guide.
         guide: supplies the sub-goals: one of `GUIDES`, or a `Guide`.
         margin: safety margin m [m]; it must hold at start and goal too.
         seed: of the guide's random choices.
@@ -126,7 +133,7 @@ def plan_motion(
         stuck, remark = legs.why_stuck(curve), curve.remark
     points, kept = np.vstack([start, points]), _SMOOTH_SHARE * kept
     motion = replace(
-        _timed(world, margin, kept, points, period, timing, time_limit, line),
+        _timed(world, margin, kept, points, period, timing, time_limit, line, planned.is_rounded),
         margin=margin,
         path=planned.path,
         goal=planned.goal,
@@ -157,10 +164,10 @@ def plan_path(
 ) -> PlannedPath:
     """Plan sub-goals alone, for a controller that follows them without a timed motion.
 
-    Args and errors as for `plan_motion`.
+    Args and errors as for `plan_motion`; an effort counts as 1.
     """
     legs = _legs(world, margin, density, alpha, kappa, sensing)
-    return _planned(legs, start, goal, guide, seed, path_margin, search)
+    return _planned(legs, start, goal, guide, seed, path_margin, replace(search, effort=1))
 
 
 def _legs(
@@ -199,12 +206,16 @@ def _planned(
     ends = {"start": start} if only is None else {"start": start, "goal": only}
     if fault := infeasibility(check, ends):
         raise PlanningError(Outcome.INFEASIBLE, fault)
-    if only is not None:
+    effort = search.effort or (_EFFORT if only is None else 1)
+    if only is not None and effort == 1:
         return plan(only, guide, search)
     began = time.perf_counter()
     found = candidates(check, start, goals, seed, search.solutions, path_margin)
-    chosen = found[: search.goals]
-    planned = plan_to_any(chosen, guide, search, plan)
+    planned = None
+    if effort > 1 and guide in ("auto", "path"):
+        between = partial(_ends, check, start)
+        planned = quickest_way(check, start, found, between, path_margin, search, effort, seed)
+    planned = planned or plan_to_any(found[: search.goals], guide, search, plan)
     return replace(planned, plan_time=time.perf_counter() - began)
 
 
@@ -232,9 +243,7 @@ def _planned_to(
     """Plan to one goal that is feasible, as is the start."""
     check = legs.check
     world, arm, margin = check.world, check.arm, check.margin
-    depart, arrive = (inside_limits(check, q) for q in (start, goal))
-    ends = np.min([check.distance_margin(q) for q in (start, depart, arrive)], axis=0)
-    least = np.maximum(0.0, _END_SHARE * ends)
+    depart, arrive, least = _ends(check, start, goal)
     kept = np.minimum(path_margin, least)
     if guide == "direct":
         # Not claimed to be clear: the density bends around what blocks it, or gets stuck there.
@@ -269,6 +278,12 @@ def _planned_to(
         raise PlanningError(error.outcome, error.detail + also) from None
     path = replace(path, stuck=stuck, remark=remark)
     return found(path, kept)
+
+
+def _ends(check: SweptCheck, start: Array, goal: Array) -> Ends:
+    depart, arrive = (inside_limits(check, q) for q in (start, goal))
+    least = np.min([check.distance_margin(q) for q in (start, depart, arrive)], axis=0)
+    return Ends(depart, arrive, np.maximum(0.0, _END_SHARE * least))
 
 
 def _searched(
@@ -347,6 +362,7 @@ def _timed(
     timing: TimingParameters,
     time_limit: float,
     line: Segment | None,
+    is_rounded: bool,
 ) -> Motion:
     """Return a smooth motion near a curve (N, nq) that keeps so much beyond the margin (K,) [m]."""
     arm = world.arm
@@ -355,10 +371,12 @@ def _timed(
         rest = np.tile(arm.angles(curve[-1]), (2, 1))
         return Motion(period, rest, np.zeros_like(rest))
     # TOPP-RA takes a tenth of a second to import.
-    from densarm.planning.smoothing import smooth_path
+    from densarm.planning.smoothing import blended_path, smooth_path
     from densarm.planning.timing import time_path
+    from densarm.planning.topp_ra import GRID_SHARE
 
-    path = smooth_path(world, margin, curve, kept, line)
+    path = blended_path(world, margin, curve, kept) if is_rounded else None
+    path = path or smooth_path(world, margin, curve, kept, line)
     if path is None:
         near = (
             "the planning system's curve is proved clear" if line is None else "the line is clear"
@@ -367,7 +385,8 @@ def _timed(
         raise PlanningError(Outcome.NO_PATH, reason)
     stops = StoppingTrajectory(arm, timing.acceleration_share, timing.torque_share)
     stopping = StoppingCheck(world, stops, margin, _STOP_SHARE * kept)
-    return time_path(arm, path, length, period, timing, stopping, time_limit)
+    share = _EVEN_SHARE if is_rounded else GRID_SHARE
+    return time_path(arm, path, length, period, timing, stopping, time_limit, grid_share=share)
 
 
 def inside_limits(check: SweptCheck, q: Array) -> Array:

@@ -12,7 +12,7 @@ from densarm.arms.arm import Arm
 from densarm.arms.dynamics import JointTorques, holding_ratios, holding_torque
 from densarm.planning.motion import Motion, PlanningError, TimingParameters
 from densarm.planning.smoothing import SmoothPath
-from densarm.planning.topp_ra import UNLIMITED, ToppRa, bounded
+from densarm.planning.topp_ra import GRID_SHARE, UNLIMITED, ToppRa, bounded
 from densarm.values.arrays import Array
 from densarm.values.outcome import Outcome
 from densarm.world.stopping import StoppingCheck
@@ -78,13 +78,15 @@ def time_path(
     time_limit: float = math.inf,
     *,
     has_rates: bool = True,
+    grid_share: float = GRID_SHARE,
 ) -> Motion:
     """Return the fastest motion along a path, from rest to rest.
 
     The grid follows from the path's length [rad]; the motion has a knot in each period [s]. Where
     stopping from every fourth of them is not proved clear, the path is slowed down until it is,
     there alone. For limits of jerk and torque rate, which may be left out, the path's parameter is
-    averaged over a window of time: the path stays, and takes as much longer as the window.
+    averaged over a window of time: the path stays, and takes as much longer as the window. Where
+    samples exceed a limit, the rarer the smaller the share of it at grid points, all is slowed.
 
     Raises:
         PlanningError: no speed meets the limits somewhere on the path, none was found that the
@@ -101,12 +103,12 @@ def time_path(
     travel = slope.mean(axis=0)
     shortest = _least_duration(arm, travel, parameters)
     unit = float(shortest.max() / np.clip(shortest.max(), *_DURATIONS))  # of time [s], to TOPP-RA
-    topp_ra = ToppRa(arm, path, grid, unit, parameters)
+    topp_ra = ToppRa(arm, path, grid, unit, parameters, grid_share)
     # No joint gets faster than √(a travel) from rest to rest, which TOPP-RA's solver does not see.
     fastest = arm.limits.fastest(path(grid), ways)
     reached = np.minimum(fastest, 2.0 * np.sqrt(arm.limits.acceleration * travel))
     with np.errstate(divide="ignore", invalid="ignore"):
-        cap = bounded(parameters.velocity_share * reached) / slope
+        cap = bounded(parameters.velocity_share * reached, grid_share) / slope
     cap[slope == 0.0] = np.inf
     cap = np.minimum(unit * cap.min(axis=1), UNLIMITED)  # path speeds [1/unit]
     longest = min(time_limit, _MOST_PERIODS * period)

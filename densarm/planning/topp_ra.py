@@ -62,7 +62,8 @@ with _left_for_later("matplotlib", "matplotlib.pyplot", "scipy.interpolate"):
 UNLIMITED = 1e4
 """Stands for an infinite limit, which the solver of TOPP-RA does not take."""
 
-_GRID_SHARE = 0.98  # of the limits at grid points; the rest is for what lies between them
+GRID_SHARE = 0.98
+"""Of the limits at grid points; the rest is for what lies between them."""
 
 
 class ToppRa:
@@ -74,16 +75,23 @@ class ToppRa:
         grid: points of s (N,), from 0 to 1.
         unit: of time [s], in which motions should take about one.
         parameters: shares of the limits that may be used.
+        share: of these at grid points.
 
     Source: Pham and Pham, A New Approach to Time-Optimal Path Parameterization Based on
         Reachability Analysis, IEEE T-RO 2018.
     """
 
     def __init__(
-        self, arm: Arm, path: SmoothPath, grid: Array, unit: float, parameters: TimingParameters
+        self,
+        arm: Arm,
+        path: SmoothPath,
+        grid: Array,
+        unit: float,
+        parameters: TimingParameters,
+        share: float = GRID_SHARE,
     ) -> None:
         self._nv, self._path, self._grid = arm.nv, path, grid
-        self._limits = _limits(arm, path, grid, unit, parameters)
+        self._limits = _limits(arm, path, grid, unit, parameters, share)
 
     def speeds(self, cap: Array) -> Array | None:
         """Return path speeds (N,) [1/unit] from rest to rest, under a cap (N,), or None."""
@@ -94,13 +102,18 @@ class ToppRa:
         return None if speed is None or not np.isfinite(speed).all() else np.asarray(speed)
 
 
-def bounded(limit: Array) -> Array:
-    """Return what of limits may be used at grid points, as numbers that the solver takes."""
-    return np.minimum(_GRID_SHARE * limit, UNLIMITED)
+def bounded(limit: Array, share: float) -> Array:
+    """Return a share of limits, as numbers that the solver takes."""
+    return np.minimum(share * limit, UNLIMITED)
 
 
 def _limits(
-    arm: Arm, path: SmoothPath, grid: Array, unit: float, parameters: TimingParameters
+    arm: Arm,
+    path: SmoothPath,
+    grid: Array,
+    unit: float,
+    parameters: TimingParameters,
+    share: float,
 ) -> "_Constraint":
     """Return limits of acceleration and torque, a s̈ + b ṡ² + c, at both ends of all intervals.
 
@@ -116,8 +129,8 @@ def _limits(
     )
     weak = np.isfinite(arm.limits.effort)
     limit = np.append(
-        bounded(parameters.acceleration_share * arm.limits.acceleration),
-        bounded(parameters.torque_share * arm.limits.effort[weak]),
+        bounded(parameters.acceleration_share * arm.limits.acceleration, share),
+        bounded(parameters.torque_share * arm.limits.effort[weak], share),
     )
     coefficients = canlinear_colloc_to_interpolate(
         np.hstack([slope, (driven - held)[:, weak]]),

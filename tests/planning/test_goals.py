@@ -20,6 +20,7 @@ from densarm.scene.scene import Scene
 from densarm.simulation.simulate import simulate
 from densarm.values.arrays import Array
 from densarm.values.outcome import Outcome
+from densarm.world.swept_check import SweptCheck, SweptVerdict
 from densarm.world.world import World
 
 HAND, DOWN = "panda_hand_tcp", (1.0, 0.0, 0.0, 0.0)
@@ -111,6 +112,20 @@ def test_ones_own_guide_is_asked_goal_by_goal(world: World, start: Array) -> Non
     alone = refused(world, start, goals, guide=Balks(), search=PlanningParameters(goals=1))
     assert alone.outcome == Outcome.NO_PATH
     assert "no wish to" in alone.detail
+
+
+def test_effort_makes_a_motion_quicker_and_the_same_each_time() -> None:
+    scenario = load_scenario("panda_shelf")
+    first, quick, again = (
+        plan_motion(scenario.world, scenario.start, goal, search=PlanningParameters(effort=effort))
+        for goal, effort in [(scenario.goal, 1), (scenario.goal, 4), (scenario.goal, 4)]
+    )
+    assert quick.duration < first.duration
+    np.testing.assert_array_equal(quick.position, again.position)
+    check = SweptCheck(scenario.world)
+    assert check.check(scenario.arm.configurations(quick.position)).verdict == SweptVerdict.CLEAR
+    with pytest.raises(InvalidValueError, match="effort"):
+        PlanningParameters(effort=0)
 
 
 def test_more_tries_never_cost_more() -> None:

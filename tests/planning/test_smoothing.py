@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from densarm.arms.arm import load_arm
-from densarm.planning.smoothing import SmoothPath, smooth_path
+from densarm.planning.smoothing import SmoothPath, blended_path, smooth_path
 from densarm.scene.obstacles import Sphere
 from densarm.scene.scene import Scene
 from densarm.values.arrays import Array
@@ -72,6 +72,24 @@ def test_margin_is_kept(check: SweptCheck, margin: float) -> None:
     assert is_clear_by_samples(check, smoothed(check, corner, margin), margin)
 
 
+@pytest.mark.parametrize("margin", [0.0, 0.1])
+def test_a_blended_corner_keeps_the_margin(check: SweptCheck, margin: float) -> None:
+    corner = check.arm.configurations(np.array([[0.6, 2.4], [1.25, 2.4], [2.4, 0.2]]))
+    path = blended_path(check.world, margin, corner)
+    assert path is not None
+    ends = check.arm.configurations(path(np.array([0.0, 1.0])))
+    np.testing.assert_allclose(ends, corner[[0, -1]], rtol=0, atol=1e-14)
+    assert is_clear_by_samples(check, path, margin)
+
+
+def test_a_straight_way_is_blended_at_an_even_rate(check: SweptCheck) -> None:
+    ends = check.arm.configurations(np.array([[0.6, 2.4], [0.6, -0.4]]))
+    path = blended_path(World(check.arm, Scene()), 0.0, ends)
+    assert path is not None
+    slope = path(np.linspace(0.0, 1.0, 101), 1)
+    np.testing.assert_allclose(slope, np.tile([0.0, -2.8], (101, 1)), atol=1e-12)
+
+
 @pytest.mark.parametrize("seed", range(8))
 def test_there_is_a_clear_path_where_the_polyline_is_clear(seed: int) -> None:
     random, arm = np.random.default_rng(seed), load_arm("two_link")
@@ -107,3 +125,4 @@ def test_end_that_nothing_but_a_fine_proof_shows_to_be_clear(
 def test_none_where_the_polyline_touches(check: SweptCheck) -> None:
     through = check.arm.configurations(np.array([[0.4, 0.0], [2.0, 0.0]]))
     assert smooth_path(check.world, 0.0, through) is None
+    assert blended_path(check.world, 0.0, through) is None

@@ -102,6 +102,7 @@ def test_a_part_is_carried_out_of_a_bin(catalogue_run: Callable[[str], Run]) -> 
     [
         ("panda_pick_place", "bottom", (0.2, 0.05, 0.07), ("can_1", "can_2", "can_3")),
         ("ur5_bin_pick", "tray_bottom", (0.15, 0.1, 0.03), ("part_1", "part_2")),
+        ("so101_desk_sort", "desk", (0.25, 0.35, 0.03), ("cork_1", "cork_2", "cork_3")),
     ],
 )
 def test_what_is_picked_is_put_where_it_belongs(

@@ -1,0 +1,220 @@
+"""Rounding of a path: it is bent evenly where that makes it quicker, and proved clear."""
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from densarm.arms.arm import Arm
+from densarm.planning.guide import FreeSpace
+from densarm.values.arrays import Array
+from densarm.values.kernels import compiled, compiled_part
+
+_SPACING = 0.15  # [rad or m] at most between points of a path
+_INSET = 0.01  # [rad or m] from position limits, or as much less as the path has
+_LEAST_GAIN = 5e-4  # of the time, less than which is not worth a check
+_LENGTH_COST = 0.05  # [s/rad or s/m] of a way, so that it does not go far for a little time
+_UNLIMITED = 1e6  # stands for limits that are infinite
+_SLIGHT = 1e-9
+
+
+def rounded(
+    arm: Arm, freedom: FreeSpace, path: Array, tries: int, rng: np.random.Generator
+) -> Array:
+    """Return a quicker path with the same ends, of points close to each other, proved clear.
+
+    Between two random points of it all joints, or one while the others go as they went, follow a
+    cubic that leaves and arrives in the directions the path has there. What is shortest has
+    corners, where an arm must be slow; what makes `way_time` less bends evenly, and may lead
+    farther around what is in the way.
+
+    Args:
+        arm: the joint space.
+        freedom: proves segments.
+        path: waypoints (W, nq), W >= 2, joined by clear segments.
+        tries: number of pairs of points.
+        rng: draws them.
+
+    Source: in the manner of K. Hauser, V. Ng-Thow-Hing, Fast Smoothing of Manipulator Trajectories
+        using Optimal Bounded-Acceleration Shortcuts, ICRA 2010, with cubics in the place of timed
+        parabolas.
+    """
+    points, allowed = _resampled(arm, path), _allowed(arm)
+    lowest = np.minimum(arm.limits.lower + _INSET, points.min(axis=0))
+    highest = np.maximum(arm.limits.upper - _INSET, points.max(axis=0))
+    box, other = np.stack([lowest, highest]), np.empty_like(points)
+    draws = np.empty((tries, 3), np.int64)
+    draws[:, :2] = np.sort(rng.integers(len(points), size=(tries, 2)))
+    draws[:, 2] = np.minimum(rng.integers(2 * arm.nv, size=tries), arm.nv)
+    least, k = _time(points, allowed), 0
+    while k := _next_quicker(points, draws, k, allowed, box, (1.0 - _LEAST_GAIN) * least, other):
+        begin, end = draws[k - 1, 0], draws[k - 1, 1]
+        if freedom.polyline_is_clear(other[begin : end + 1]):
+            points[begin : end + 1] = other[begin : end + 1]
+            least = _time(points, allowed)
+    return arm.configurations(points)
+
+
+def way_time(arm: Arm, path: Array) -> float:
+    r"""Return about how long a way through configurations (N, nq) takes from rest to rest [s].
+
+    Only limits of velocity and acceleration count, and of ṡ(s), with s the length, so much that
+
+    .. math:: |\theta'_j| \dot s \le v_j, \qquad |\theta'_j \ddot s + \theta''_j \dot s^2| \le a_j
+
+    about holds at points close to each other, a corner at one being a bend of half of the segments
+    beside it. A little is added for the length.
+    """
+    return float(_time(_resampled(arm, path), _allowed(arm)))
+
+
+def _allowed(arm: Arm) -> Array:
+    """Return velocities and accelerations that joints may have (2, nv)."""
+    limits: Array = np.stack([arm.limits.velocity, arm.limits.acceleration])
+    return np.minimum(limits, _UNLIMITED)
+
+
+def _resampled(arm: Arm, path: Array) -> Array:
+    """Return joint positions (N, nv) along a path, its waypoints (W, nq) among them, N >= 3."""
+    steps = arm.difference(path[:-1], path[1:])
+    whole = np.ceil(np.linalg.norm(steps, axis=1) / _SPACING - _SLIGHT).astype(int)
+    parts = np.maximum(whole, 2 if len(path) == 2 else 1)
+    each = np.repeat(steps / parts[:, np.newaxis], parts, axis=0)
+    points: Array = arm.angles(path[0]) + np.vstack([np.zeros(arm.nv), np.cumsum(each, axis=0)])
+    return points
+
+
+@compiled
+def _next_quicker(
+    points: Array,
+    draws: NDArray[np.int64],
+    first: int,
+    allowed: Array,
+    box: Array,
+    most: float,
+    out: Array,
+) -> int:
+    """Write the first way of those drawn that takes less than a time [s], and return its number.
+
+    Args:
+        points: joint positions (N, nv) [rad or m].
+        draws: two points, and the joint that is bent, nv for all (M, 3).
+        first: how many of them were looked at.
+        allowed: as `_allowed` returns it.
+        box: lowest and highest positions (2, nv) [rad or m].
+        most: the time [s].
+        out: the way (N, nv), overwritten.
+
+    Returns:
+        How many were looked at, that one included; zero if none of the rest is quicker.
+    """
+    for k in range(first, draws.shape[0]):
+        begin, end, joint = draws[k, 0], draws[k, 1], draws[k, 2]
+        if end - begin < 2:
+            continue
+        _bend(points, begin, end, joint, out)
+        is_inside = True
+        for i in range(begin + 1, end):
+            for j in range(points.shape[1]):
+                if out[i, j] < box[0, j] or out[i, j] > box[1, j]:
+                    is_inside = False
+        if is_inside and _time(out, allowed) < most:
+            return k + 1
+    return 0
+
+
+@compiled_part
+def _bend(points: Array, begin: int, end: int, joint: int, out: Array) -> None:
+    """Write the path with a cubic between two of its points, of one joint or of all (nv)."""
+    n, nv = points.shape
+    for i in range(n):
+        for j in range(nv):
+            out[i, j] = points[i, j]
+    length = 0.0
+    for i in range(begin, end):
+        length += _apart(points, i, i + 1)
+    before = _apart(points, begin - 1, begin) if begin > 0 else 0.0
+    after = _apart(points, end, end + 1) if end < n - 1 else 0.0
+    if length < _SLIGHT:
+        return
+    for j in range(nv) if joint == nv else range(joint, joint + 1):
+        a, b = points[begin, j], points[end, j]
+        slope_a = (a - points[begin - 1, j]) * length / before if before > _SLIGHT else math.nan
+        slope_b = (points[end + 1, j] - b) * length / after if after > _SLIGHT else math.nan
+        slope_a, slope_b = _known(slope_a, slope_b, b - a), _known(slope_b, slope_a, b - a)
+        gone = 0.0
+        for i in range(begin + 1, end):
+            gone += _apart(points, i - 1, i)
+            u = gone / length
+            w = 1.0 - u
+            out[i, j] = a + u * u * (3.0 - 2.0 * u) * (b - a) + u * w * (w * slope_a - u * slope_b)
+
+
+@compiled_part
+def _known(slope: float, other: float, rise: float) -> float:
+    """Return a slope at an end of a cubic, or if it is free the one of no bend there."""
+    if not math.isnan(slope):
+        return slope
+    return rise if math.isnan(other) else 1.5 * rise - 0.5 * other
+
+
+@compiled_part
+def _apart(points: Array, i: int, k: int) -> float:
+    square = 0.0
+    for j in range(points.shape[1]):
+        square += (points[k, j] - points[i, j]) ** 2
+    return math.sqrt(square)
+
+
+@compiled
+def _time(points: Array, allowed: Array) -> float:
+    """Return about how long a way through joint positions (N, nv) takes, see `way_time`."""
+    n, nv = points.shape
+    step, square = np.empty(n), np.empty(n)  # of lengths, and of speeds
+    slope, bend = np.empty((n, nv)), np.zeros((n, nv))
+    for i in range(n - 1):
+        step[i] = _apart(points, i, i + 1) + _SLIGHT
+    for i in range(n):
+        before, after = max(i - 1, 0), min(i + 1, n - 1)
+        fastest = _UNLIMITED**2
+        for j in range(nv):
+            come = (points[i, j] - points[before, j]) / step[before]
+            go = (points[after, j] - points[i, j]) / step[after - 1]
+            if before == i or after == i:
+                slope[i, j] = come + go
+            else:
+                whole = step[before] + step[i]
+                slope[i, j] = (come * step[i] + go * step[before]) / whole
+                bend[i, j] = 2.0 * (go - come) / whole
+            steepest = max(abs(come), abs(go)) + _SLIGHT
+            fastest = min(fastest, (allowed[0, j] / steepest) ** 2)
+            fastest = min(fastest, allowed[1, j] / (abs(bend[i, j]) + _SLIGHT))
+        square[i] = fastest
+    square[0] = square[n - 1] = 0.0
+    for i in range(1, n):
+        _bound(slope, bend, i - 1, i, 2.0 * step[i - 1], square, allowed[1])
+    total = 0.0
+    for i in range(n - 2, -1, -1):
+        _bound(slope, bend, i + 1, i, -2.0 * step[i], square, allowed[1])
+        time = 2.0 * step[i] / (math.sqrt(square[i]) + math.sqrt(square[i + 1]) + _SLIGHT)
+        total += time + _LENGTH_COST * step[i]
+    return total
+
+
+@compiled_part
+def _bound(
+    slope: Array, bend: Array, near: int, far: int, twice: float, square: Array, most: Array
+) -> None:
+    """Bound ṡ² at a point by that at the one near it, under accelerations at both.
+
+    It is twice the way between them times s̈ larger, the way backwards being negative.
+    """
+    largest = square[far]
+    for j in range(slope.shape[1]):
+        for i in (near, far):
+            by_rise = slope[i, j] / twice + (bend[i, j] if i == far else 0.0)
+            constant = bend[i, j] * square[near]
+            if abs(by_rise) > _SLIGHT:
+                room = max(0.0, most[j] - math.copysign(constant, constant * by_rise))
+                largest = min(largest, square[near] + room / abs(by_rise))
+    square[far] = largest
