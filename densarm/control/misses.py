@@ -47,7 +47,7 @@ class MissesAhead:
     ) -> None:
         arm, geometry = world.arm, world.geometry_model
         self._world, self._limits, self._miss = world, limits, miss
-        self._queries = PairQueries(arm.model, geometry, world.pair_shapes, remembers=False)
+        self._queries = PairQueries(arm.model, world, remembers=False)
         self._places, self._came = shape_positions(self._queries.data), -1
         self._data = arm.model.createData()
         self._jacobian = self._data.J.reshape(6, arm.nv)

@@ -12,16 +12,19 @@ import pinocchio as pin
 from numpy.typing import ArrayLike
 
 from densarm.arms.arm import Arm
-from densarm.scene.obstacles import geometry_objects
+from densarm.scene.obstacles import HalfSpace, Obstacle, geometry_objects
+from densarm.scene.point_cloud import PointCloud
 from densarm.scene.scene import Scene
 from densarm.scene.shapes import box_hull, extreme_points
 from densarm.values.arrays import Array
 from densarm.visualization.palette import BOARD, OBSTACLE, SENSING, Color
-from densarm.visualization.triangle_mesh import TriangleMesh, mesh_of, sphere_swept_hull
+from densarm.visualization.triangle_mesh import TriangleMesh, mesh_of, octahedra, sphere_swept_hull
 
 WORLD = 0
 """Index of the joint that carries what does not move."""
 
+_MOST_POINTS = 20_000  # of a cloud that are drawn
+_DRAWN_SHARE = 0.4  # of their radius, so that one can see through
 _BOARD_WIDTH, _BOARD_THICKNESS = 3.0, 0.01  # [m], of what is drawn of a half-space
 
 
@@ -37,7 +40,8 @@ class Body:
     mesh: TriangleMesh
     color: Color
     shape: coal.CollisionGeometry
-    """What the mesh is the surface of."""
+    """What the mesh is the surface of; of a cloud, each of its balls."""
+    is_cloud: bool = False
 
     @property
     def has_end(self) -> bool:
@@ -68,10 +72,11 @@ def arm_bodies(arm: Arm) -> tuple[Body, ...]:
 def obstacle_bodies(scene: Scene, origin: ArrayLike = (0.0, 0.0, 0.0)) -> tuple[Body, ...]:
     """Return the obstacles, seen from a point (3,) [m], in the shapes that distances are of.
 
-    A half-space is a thin board at the part of its surface nearest the origin.
+    A half-space is a thin board at the part of its surface nearest the origin, a cloud an
+    small octahedron for each point, of 20,000 points at most.
     """
     return tuple(
-        _board(item) if isinstance(item.geometry, coal.Halfspace) else _body(item, OBSTACLE)
+        _drawn(obstacle, item)
         for obstacle in scene
         for item in geometry_objects(obstacle, origin=origin)
     )
@@ -93,13 +98,23 @@ def spoken_names(arm: Arm, names: Iterable[str]) -> dict[str, str]:
 
 
 def sensing_bodies(obstacles: Sequence[Body], distance: float) -> tuple[Body, ...]:
-    """Return all that is within a distance [m] of each obstacle that has an end."""
+    """Return all that is within a distance [m] of each obstacle that has an end and is no cloud."""
     return tuple(
         replace(body, mesh=sphere_swept_hull(points, radius + distance), color=SENSING)
         for body in obstacles
-        if body.has_end
+        if body.has_end and not body.is_cloud
         for points, radius in [extreme_points(body.shape)]
     )
+
+
+def _drawn(obstacle: Obstacle, item: pin.GeometryObject) -> Body:
+    if isinstance(obstacle, PointCloud):
+        every = -(-len(obstacle.points) // _MOST_POINTS)
+        mesh = octahedra(obstacle.points[::every], _DRAWN_SHARE * obstacle.radius)
+        return Body(item.name, WORLD, item.placement, mesh, OBSTACLE, item.geometry, is_cloud=True)
+    if isinstance(obstacle, HalfSpace):
+        return _board(item)
+    return _body(item, OBSTACLE)
 
 
 def _board(item: pin.GeometryObject) -> Body:

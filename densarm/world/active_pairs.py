@@ -102,7 +102,7 @@ class ActivePairs:
         self._updates_kinematics = kinematics is None
         self.kinematics = kinematics or Kinematics(arm)
         """Placements and Jacobian at the last update."""
-        self._queries = PairQueries(arm.model, self._geometry, world.pair_shapes, remembers=False)
+        self._queries = PairQueries(arm.model, world, remembers=False)
         self._geometry_data = self._queries.data
         self.rows: Array = self._queries.rows
         """[distance, normal, point 1, point 2] (K, 10) [m]; old where a pair is asleep."""
@@ -172,7 +172,7 @@ class ActivePairs:
             self.kinematics.update(q)
         if n_awake:
             self._place_shapes(data)
-            self._queries.ask_active()
+            self._queries.ask_active(self.state)
 
     def _place_shapes(self, data: pin.GeometryData) -> None:
         kinematics = self.kinematics

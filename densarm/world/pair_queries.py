@@ -1,6 +1,7 @@
 """PairQueries: coal's distances of pairs of bodies, asked for again where it has found none."""
 
 import warnings
+from typing import Any
 
 import coal
 import numpy as np
@@ -10,7 +11,9 @@ from numpy.typing import NDArray
 from densarm.scene.shapes import FARTHEST
 from densarm.values.arrays import Array
 from densarm.values.kernels import compiled
+from densarm.world.cloud_balls import CloudBalls
 from densarm.world.distance_view import DistanceView
+from densarm.world.obstacle_slots import ChangingObstacles
 
 COAL_TOLERANCE = 1e-10
 """GJK and EPA tolerance [m]; at coal's default of 1e-6 gradients err by up to 4e-3."""
@@ -29,8 +32,7 @@ class PairQueries:
 
     Args:
         model: moves the shapes.
-        geometry: the pairs, all present.
-        pair_shapes: indices of the two shapes of each pair (K, 2).
+        obstacles: the pairs, all present, and the clouds among them.
         remembers: whether each search begins where the pair's last one ended, unless a body is
             large. The last digits of distances depend on earlier queries then.
     """
@@ -38,10 +40,10 @@ class PairQueries:
     def __init__(
         self,
         model: pin.Model,
-        geometry: pin.GeometryModel,
-        pair_shapes: NDArray[np.int64],
+        obstacles: ChangingObstacles,
         remembers: bool,
     ) -> None:
+        geometry, pair_shapes = obstacles.geometry_model, obstacles.pair_shapes
         self._geometry = geometry
         self.data: pin.GeometryData = geometry.createData()
         """Pinocchio's data, whose placements are to be updated before a query."""
@@ -55,6 +57,7 @@ class PairQueries:
             request.gjk_tolerance = request.epa_tolerance = COAL_TOLERANCE
         _forget([self._requests[k] for k in np.flatnonzero(forgets)])
         pin.computeDistances(model, model.createData(), geometry, self.data, pin.neutral(model))
+        self._balls = CloudBalls(obstacles, self.data) if obstacles.clouds else None
         self._view = DistanceView(self.data)
         self.rows: Array = self._view.read()
         """[distance, normal, point 1, point 2] (K, 10) [m], each of the pair's last query."""
@@ -64,13 +67,17 @@ class PairQueries:
     def ask(self, pairs: NDArray[np.int64]) -> None:
         """Query some pairs (P,)."""
         geometry, data = self._geometry, self.data
+        if self._balls:
+            self._balls.place(pairs)
         for k in pairs.tolist():
             pin.computeDistance(geometry, data, k)
         if not _are_known(self._view.read(), pairs):
             self._ask_again()
 
-    def ask_active(self) -> None:
-        """Query the active pairs of the data, of which there are some."""
+    def ask_active(self, is_active: NDArray[Any]) -> None:
+        """Query the active pairs of the data, of which there are some, nonzero where told (K,)."""
+        if self._balls:
+            self._balls.place(np.flatnonzero(is_active))
         nearest = pin.computeDistances(self._geometry, self.data)
         # What stands for no distance is less than all others.
         if not self._view.read()[nearest, 0] > -_FAR:
