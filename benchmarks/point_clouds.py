@@ -3,6 +3,10 @@
     python benchmarks/point_clouds.py
     python benchmarks/point_clouds.py --problems panda.json --every 10
 
+Without problems, Panda leaves the shelf of panda_shelf, a cloud of 20,000 points, again and again,
+first with nothing beside the loop, then with a thread that replaces all points 30 times a second. A
+step is the controller's torque, called every millisecond.
+
 With problems, each obstacle becomes points on its faces, 10 mm apart, as balls of 8 mm, which cover
 the faces. A problem whose start or goal the cloud makes a contact of is left out. Runs are the
 torque-driven closed loop, proved against the cloud; contacts are those with the obstacles' own
@@ -10,13 +14,19 @@ shapes.
 """
 
 import argparse
+import gc
 import sys
+import threading
+import time
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
+from densarm.control.tracking import DensityTracking
+from densarm.planning.plan import plan_motion
 from densarm.scenarios.run import run
+from densarm.scenarios.scenario import load_scenario
 from densarm.scene.loading import MotionProblem, load_problems
 from densarm.scene.obstacles import Box, Cylinder, Obstacle, obstacle_pose
 from densarm.scene.point_cloud import PointCloud
@@ -30,6 +40,7 @@ from densarm.world.swept_check import SweptCheck
 from densarm.world.world import World
 
 SPACING, RADIUS = 0.01, 0.008  # [m]
+PERIOD = 1e-3  # [s]
 
 
 def grid(length: float) -> Array:
@@ -69,6 +80,62 @@ def seen(problem: MotionProblem) -> MotionProblem:
     return replace(problem, scene=Scene([cloud], problem.scene.attachments))
 
 
+def time_steps(points: int, seconds: float, interval: float) -> None:
+    """Print how long steps take, alone and with updates beside them."""
+    scenario, random = load_scenario("panda_shelf"), np.random.default_rng(0)
+    surface = np.vstack([faces(obstacle) for obstacle in scenario.scene])
+    surface = surface[random.choice(len(surface), points)]
+    cloud = PointCloud(name="cloud", points=surface, radius=RADIUS)
+    world = World(scenario.arm, Scene([cloud]))
+    motion = plan_motion(world, scenario.start, scenario.goal)
+    controller = DensityTracking(world, motion)
+    rows = motion.samples(PERIOD)
+    sys.setswitchinterval(interval)
+    frames = [surface + random.normal(0.0, 1e-3, surface.shape) for _ in range(8)]
+    for beside in (False, True):
+        stop, spent = threading.Event(), list[float]()
+        thread = threading.Thread(target=update, args=(world, frames, stop, spent))
+        if beside:
+            thread.start()
+        durations, late, due = list[float](), list[float](), time.perf_counter()
+        gc.disable()
+        for k in range(int(seconds / PERIOD)):
+            i = k % len(rows.position)
+            q, v = scenario.arm.configurations(rows.position[i]), rows.velocity[i]
+            due += PERIOD
+            while (left := due - time.perf_counter()) > 0.0:
+                time.sleep(max(0.0, left - 2e-4))
+            begun = time.perf_counter()
+            controller.torque(i * PERIOD, q, v)
+            ended = time.perf_counter()
+            durations.append(ended - begun)
+            late.append(ended - due)
+            due = max(due, begun)
+        gc.enable()
+        stop.set()
+        if beside:
+            thread.join()
+        times, ends = 1e6 * np.array(durations), 1e6 * np.array(late)
+        told = "beside updates" if beside else "alone"
+        median, most = np.percentile(times, [50, 99.9])
+        print(f"{points} points, {told}: step 50 / 99.9 %: {median:.0f} / {most:.0f} us, ", end="")
+        late_most, largest = np.percentile(ends, 99.9), ends.max()
+        print(f"ended after its time 99.9 %: {late_most:.0f}, largest {largest:.0f} us")
+        if spent:
+            times = 1e3 * np.array(spent)
+            print(f"{len(spent)} updates: {np.median(times):.1f}, largest {times.max():.1f} ms")
+
+
+def update(world: World, frames: list[Array], stop: threading.Event, spent: list[float]) -> None:
+    due = time.perf_counter()
+    while not stop.is_set():
+        begun = time.perf_counter()
+        world.update_cloud("cloud", frames[len(spent) % len(frames)])
+        spent.append(time.perf_counter() - begun)
+        due += 1.0 / 30.0
+        time.sleep(max(0.0, due - time.perf_counter()))
+
+
 def run_problems(path: Path, every: int) -> bool:
     plans, reached, contacts, free, sizes = list[float](), 0, 0, 0, list[int]()
     for problem in load_problems(path)[::every]:
@@ -101,7 +168,13 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("--problems", type=Path)
     parser.add_argument("--every", type=int, default=1)
+    parser.add_argument("--points", type=int, default=20_000)
+    parser.add_argument("--seconds", type=float, default=20.0)
+    parser.add_argument("--switch-interval", type=float, default=1e-4, help="of Python [s]")
     options = parser.parse_args()
+    if options.problems is None:
+        time_steps(options.points, options.seconds, options.switch_interval)
+        return 0
     return 0 if run_problems(options.problems, options.every) else 1
 
 

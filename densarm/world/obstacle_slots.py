@@ -64,10 +64,11 @@ class ChangingObstacles:
         self.clouds: list[PlacedObstacle] = []
         """Those that are point clouds, present or spare."""
         end = len(self._shapes) - sum(counts)
+        # Pairs are in the order of the obstacles' shapes.
+        last = np.maximum.accumulate(pair_shapes.max(axis=1, initial=-1))
         for obstacle, count in zip(scene, counts, strict=True):
             begin, end = end, end + count
-            own = np.flatnonzero((pair_shapes >= begin) & (pair_shapes < end)) // 2
-            pairs = slice(own[0], own[-1] + 1) if own.size else slice(0)
+            pairs = slice(*np.searchsorted(last, [begin, end]).tolist())
             ways, twists = self.obstacle_way[pairs], self.twist[pairs]
             slot = PlacedObstacle(self._shapes[begin:end], pairs, ways, twists)
             slot.hold(obstacle, self._origin)

@@ -1,7 +1,6 @@
 """PairQueries: coal's distances of pairs of bodies, asked for again where it has found none."""
 
 import warnings
-from typing import Any
 
 import coal
 import numpy as np
@@ -20,6 +19,7 @@ COAL_TOLERANCE = 1e-10
 
 _LARGE = 10.0  # [m], radius of bodies of which a remembered guess may end at a wrong distance
 _LOOSEST = 1e-6  # tolerance [m]
+_FEW = 1000  # times as many pairs sleep as are awake where those are asked one by one
 _FAR = 10.0 * FARTHEST  # [m], beyond all distances that there are
 
 
@@ -74,10 +74,13 @@ class PairQueries:
         if not _are_known(self._view.read(), pairs):
             self._ask_again()
 
-    def ask_active(self, is_active: NDArray[Any]) -> None:
-        """Query the active pairs of the data, of which there are some, nonzero where told (K,)."""
+    def ask_active(self, pairs: NDArray[np.int64]) -> None:
+        """Query some pairs (P,), which are all that are active in the data."""
+        if _FEW * len(pairs) < len(self._requests):
+            self.ask(pairs)  # passing over those that sleep would take longer
+            return
         if self._balls:
-            self._balls.place(np.flatnonzero(is_active))
+            self._balls.place(pairs)
         nearest = pin.computeDistances(self._geometry, self.data)
         # What stands for no distance is less than all others.
         if not self._view.read()[nearest, 0] > -_FAR:

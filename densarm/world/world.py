@@ -123,7 +123,7 @@ class World(ChangingObstacles):
         """
         for obstacle in reserve.obstacles[len(scene) :]:
             self.remove_obstacle(obstacle.name)
-        self._is_spare = np.zeros(self.n_pairs, bool)
+        self._is_spare, self._there = np.zeros(self.n_pairs, bool), np.arange(self.n_pairs)
 
     def __repr__(self) -> str:
         return f"World({self.arm}, {self.scene}, {self.n_pairs} pairs)"
@@ -289,7 +289,7 @@ class World(ChangingObstacles):
         if pairs is not None and len(pairs) < self.n_pairs:
             self._queries.ask(pairs)
         elif not self._is_spare.all():
-            self._queries.ask_active(~self._is_spare)
+            self._queries.ask_active(self._there)
         return self._queries.rows
 
     def _skip_spare_pairs(self) -> None:
@@ -299,7 +299,7 @@ class World(ChangingObstacles):
                 self._geometry_data.deactivateCollisionPair(k)
             else:
                 self._geometry_data.activateCollisionPair(k)
-        self._is_spare = is_spare
+        self._is_spare, self._there = is_spare, np.flatnonzero(~is_spare)
 
 
 def base_overlaps(arm: Arm, scene: Scene) -> tuple[str, ...]:
@@ -353,7 +353,7 @@ def _geometry_model(arm: Arm, scene: Scene) -> tuple[pin.GeometryModel, list[int
         for name in numbered(each.body.name, len(each.body.convex_shapes()))
         for obstacle in each.touch_obstacles
     }
-    counts = []
+    counts, pairs = [], model.collisionPairs
     for obstacle in scene:
         before = model.ngeoms
         facing = [k for k in moving if (names[k], obstacle.name) not in touching]
@@ -365,6 +365,7 @@ def _geometry_model(arm: Arm, scene: Scene) -> tuple[pin.GeometryModel, list[int
             for links in [[k] for k in facing] if alone else [facing]:
                 index = model.addGeometryObject(item)
                 for k in links:
-                    model.addCollisionPair(pin.CollisionPair(int(k), int(index)))
+                    # addCollisionPair would compare it with all others.
+                    pairs.append(pin.CollisionPair(int(k), int(index)))
         counts.append(model.ngeoms - before)
     return model, counts

@@ -100,7 +100,7 @@ def test_active_pairs_follow_the_arm_and_the_cloud(panda_ready: tuple[Arm, Array
     random = np.random.default_rng(0)
     world = World(arm, Scene([cloud_of(points_around(random, 200))]))
     pairs = ActivePairs(world)
-    pairs.reach[:] = 0.2
+    pairs.set_reach(0.2)
     for k in range(40):
         q = arm.integrate(q, random.uniform(-0.02, 0.02, arm.nv))
         if k % 8 == 7:
