@@ -57,6 +57,7 @@ from .scene.obstacles import Capsule as Capsule
 from .scene.obstacles import Cylinder as Cylinder
 from .scene.obstacles import HalfSpace as HalfSpace
 from .scene.obstacles import Sphere as Sphere
+from .scene.point_cloud import PointCloud as PointCloud
 from .scene.scene import Attachment as Attachment
 from .scene.scene import Scene as Scene
 from .simulation.disturbances import Disturbances as Disturbances

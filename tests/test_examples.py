@@ -77,6 +77,14 @@ def test_own_control_loop(
 
 
 @pytest.mark.slow
+def test_point_cloud(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    run_example(monkeypatch, "point_cloud.py")
+    points, result = capsys.readouterr().out.splitlines()
+    assert int(points.split()[0]) > 10_000
+    assert result.startswith("reached, certified: True, smallest distance ")
+
+
+@pytest.mark.slow
 def test_plan_beside(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
     run_example(monkeypatch, "plan_beside.py")
     planned, result = capsys.readouterr().out.splitlines()

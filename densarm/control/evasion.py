@@ -170,6 +170,7 @@ class Evasion:
         """
         angles, found = self._arm.angles(q), np.empty(self._arm.nv)
         self._write_rows(v, angles)
+        self._pairs.set_reach(self._pairs.reach)  # which kernels have written to
         gives_way = self._nearest(
             angles, v, nominal, self._limits, self._rows, self._count, self._chosen, found
         )

@@ -52,7 +52,7 @@ class MissesAhead:
         arm, geometry = world.arm, world.geometry_model
         self._world, self._limits = world, limits
         self._margins, self._reach = np.array([margin, miss]), miss + _REACH
-        self._queries = PairQueries(arm.model, geometry, world.pair_shapes, remembers=False)
+        self._queries = PairQueries(arm.model, world, remembers=False)
         self._places, self._came = shape_positions(self._queries.data), -1
         self._data = arm.model.createData()
         self._jacobian = by_columns(self._data.J, (6, arm.nv))

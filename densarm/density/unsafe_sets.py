@@ -128,8 +128,8 @@ class ClearanceSet:
         self._standing = self.sensing_distance.copy()
         pairs = self.pairs
         jacobian, sign = pairs.kinematics.jacobian, world.sign
-        self._arrays = pairs.state, pairs.rows, jacobian, sign, self.margin, self.sensing_distance
-        self._add_log_bumps = entry_point(_add_active_log_bumps, *self._arrays, 0.0, any_vector)
+        self._arrays = pairs.listed, pairs.rows, jacobian, sign, self.margin, self.sensing_distance
+        self._add_log_bumps = entry_point(_add_active_log_bumps, 0, *self._arrays, 0.0, any_vector)
         self.set_sensing_distance(self.sensing_distance)
 
     def set_sensing_distance(self, sensing_distance: Array) -> None:
@@ -139,7 +139,7 @@ class ClearanceSet:
             is_moving = self._is_moving()
             self._n_moving = int(np.count_nonzero(is_moving))
             self.sensing_distance[is_moving] = self._moving
-        np.add(self.margin, self.sensing_distance, out=self.pairs.reach)
+        self.pairs.set_reach(self.margin + self.sensing_distance)
 
     def add_log_bump(self, q: Array, theta: float, out_gradient: Array) -> float:
         """Act as `UnsafeSet.add_log_bump`."""
@@ -151,7 +151,7 @@ class ClearanceSet:
             if now != self._n_moving:
                 self.set_sensing_distance(self._standing)
         pairs.update(q)
-        value: float = self._add_log_bumps(*self._arrays, theta, out_gradient)
+        value: float = self._add_log_bumps(pairs.n_awake, *self._arrays, theta, out_gradient)
         return value
 
     def _is_moving(self) -> NDArray[np.bool_]:
@@ -277,7 +277,8 @@ def _count_moving(way: Array, before: Array, has_motion: NDArray[np.bool_]) -> i
 
 @compiled
 def _add_active_log_bumps(
-    state: NDArray[np.int64],
+    n_awake: int,
+    listed: NDArray[np.int64],
     rows: Array,
     jacobian: Array,
     sign: Array,
@@ -286,11 +287,15 @@ def _add_active_log_bumps(
     theta: float,
     out_gradient: Array,
 ) -> float:
-    total, far = 0.0, math.log1p(theta)
-    for k in range(state.shape[0]):
-        if state[k] == 0:
-            total += far
-            continue
+    total, far, passed = 0.0, math.log1p(theta), 0
+    for n in range(n_awake + 1):
+        k = listed[n] if n < n_awake else listed.shape[0]
+        if far > 0.0:  # one by one, as for pairs that are awake, to the last bit
+            for _ in range(passed, k):
+                total += far
+        if n == n_awake:
+            break
+        passed = k + 1
         value, slope = log_inverse_bump(rows[k, 0] - margin, width[k], theta)
         total += value
         if slope != 0.0:

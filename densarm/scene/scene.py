@@ -9,6 +9,7 @@ from densarm.errors import InvalidValueError, UnknownNameError
 from densarm.scene.mesh import Mesh
 from densarm.scene.motion import MOTION_TYPES, ObstacleMotion
 from densarm.scene.obstacles import Box, Capsule, Cylinder, HalfSpace, Obstacle, Sphere
+from densarm.scene.point_cloud import PointCloud, packed_points
 from densarm.values.checks import non_negative
 from densarm.values.documented import documented
 
@@ -22,6 +23,7 @@ OBSTACLE_TYPES: Mapping[str, type[Obstacle]] = {
     "cylinder": Cylinder,
     "half_space": HalfSpace,
     "mesh": Mesh,
+    "point_cloud": PointCloud,
 }
 """Every kind of obstacle by the word that files use for it."""
 
@@ -35,8 +37,8 @@ class Attachment:
     its own and is not listed in `touch_links`.
 
     Raises:
-        InvalidValueError: the body is none or has no end, a link without a name, or a mass that
-            is not a finite number >= 0.
+        InvalidValueError: the body is none, has no end or is a cloud, a link without a name, or a
+            mass that is not a finite number >= 0.
     """
 
     body: Obstacle
@@ -51,7 +53,7 @@ class Attachment:
     """Obstacles that it may touch and even enter, as what it is lifted from."""
 
     def __post_init__(self) -> None:
-        kinds = [kind for kind in OBSTACLE_TYPES.values() if kind is not HalfSpace]
+        kinds = [x for x in OBSTACLE_TYPES.values() if x not in (HalfSpace, PointCloud)]
         _require_kind("attached body", self.body, kinds)
         name = self.body.name
         if self.body.motion is not None:
@@ -157,6 +159,8 @@ class Scene:
 def obstacle_table(obstacle: Obstacle) -> dict[str, Any]:
     """Return an obstacle as plain data; `parse_obstacle` is its inverse."""
     table = {"type": _word(obstacle, OBSTACLE_TYPES), **asdict(obstacle)}
+    if isinstance(obstacle, PointCloud):
+        table["points"] = packed_points(obstacle.points)
     if obstacle.motion is None:
         del table["motion"]
     else:

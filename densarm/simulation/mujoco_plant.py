@@ -284,7 +284,10 @@ class MujocoPlant:
     def _place_obstacles(self) -> None:
         """Put obstacles where they are now; those that are spare go out of reach."""
         world, model = self._world, self.model
-        spare = set(world.pair_shapes[world.changes < 0].max(axis=1))
+        away = world.changes < 0
+        for cloud in world.clouds:  # whose balls MuJoCo does not move
+            away[cloud.pairs] = True
+        spare = set(world.pair_shapes[away].max(axis=1))
         for k in range(_first_obstacle(world), world.geometry_model.ngeoms):
             item = world.geometry_model.geometryObjects[k]
             pose = _seen(item.placement, self._origin)

@@ -43,7 +43,7 @@ class DamperEvasion(Evasion):
     def _near(self) -> tuple[Pairs, Array, Array, Array]:
         """Return pairs within reach, their distances, gradients (P, nv) and ∂d_k/∂t."""
         pairs, world = self._pairs, self._world
-        np.maximum(pairs.reach, REACH, out=pairs.reach)
+        pairs.set_reach(np.maximum(pairs.reach, REACH))
         near = np.flatnonzero((pairs.state != 0) & (pairs.rows[:, 0] < REACH))
         rows, slopes = np.ascontiguousarray(pairs.rows[near]), np.zeros((len(near), self._arm.nv))
         add_pair_gradients(rows, pairs.kinematics.jacobian, world.sign[near], slopes)

@@ -26,10 +26,10 @@ _KERNELS_TEXT = _kernels_text()
 
 
 if TYPE_CHECKING:  # numba's stubs do not know the options
-    compiled = compiled_part = numba.njit(cache=True, error_model="numpy")
+    compiled = compiled_beside = compiled_part = numba.njit(cache=True, error_model="numpy")
 else:
 
-    def compiled(function):
+    def compiled(function, **options):
         """Compile a kernel at its first call, and keep the code on disk.
 
         Division follows IEEE 754 instead of raising. The Python function stays reachable as
@@ -37,11 +37,15 @@ else:
         may be made of, since a kernel with constants or parts of another version would compute
         something else.
         """
-        kernel = numba.njit(cache=True, error_model="numpy")(function)
+        kernel = numba.njit(cache=True, error_model="numpy", **options)(function)
         if cache := getattr(kernel, "_cache", None):  # none where compiling is switched off
             file = cache._cache_file
             file._source_stamp = (file._source_stamp, _KERNELS_TEXT)
         return kernel
+
+    def compiled_beside(function):
+        """Compile a long kernel as `compiled` does, which lets other threads go on meanwhile."""
+        return compiled(function, nogil=True)
 
     compiled_part = numba.njit(error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)
 """`compiled_part` is the decorator of functions that kernels alone call, and are compiled into.

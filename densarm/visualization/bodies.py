@@ -12,16 +12,19 @@ import pinocchio as pin
 from numpy.typing import ArrayLike
 
 from densarm.arms.arm import Arm
-from densarm.scene.obstacles import geometry_objects
+from densarm.scene.obstacles import Obstacle, geometry_objects
+from densarm.scene.point_cloud import PointCloud
 from densarm.scene.scene import Scene
 from densarm.scene.shapes import extreme_points
 from densarm.values.arrays import Array
 from densarm.visualization.palette import BOARD, OBSTACLE, SENSING, Color
-from densarm.visualization.triangle_mesh import TriangleMesh, mesh_of, sphere_swept_hull
+from densarm.visualization.triangle_mesh import TriangleMesh, mesh_of, octahedra, sphere_swept_hull
 
 WORLD = 0
 """Index of the joint that carries what does not move."""
 
+_MOST_POINTS = 20_000  # of a cloud that are drawn
+_DRAWN_SHARE = 0.4  # of their radius, so that one can see through
 _BOARD_THICKNESS = 0.01  # [m], of what is drawn of a half-space
 
 
@@ -37,7 +40,8 @@ class Body:
     mesh: TriangleMesh
     color: Color
     shape: coal.CollisionGeometry
-    """What the mesh is the surface of."""
+    """What the mesh is the surface of; of a cloud, each of its balls."""
+    is_cloud: bool = False
 
     def corners(self, joint_poses: Sequence[pin.SE3]) -> Array:
         """Return the bounding box's corners (8, 3) in the world [m], given the joints' poses."""
@@ -61,10 +65,13 @@ def arm_bodies(arm: Arm) -> tuple[Body, ...]:
 
 
 def obstacle_bodies(scene: Scene, origin: ArrayLike = (0.0, 0.0, 0.0)) -> tuple[Body, ...]:
-    """Return the obstacles that have an end, seen from a point (3,) [m], as distances are of."""
+    """Return the obstacles that have an end, seen from a point (3,) [m], as distances are of.
+
+    A cloud is a small octahedron for each point, of 20,000 points at most.
+    """
     return tuple(
-        _body(item, OBSTACLE)
-        for item in _items(scene, origin)
+        _drawn(obstacle, item)
+        for obstacle, item in _items(scene, origin)
         if not isinstance(item.geometry, coal.Halfspace)
     )
 
@@ -78,7 +85,7 @@ def half_space_bodies(
     """
     return tuple(
         _board(item, middle, width)
-        for item in _items(scene, origin)
+        for _, item in _items(scene, origin)
         if isinstance(item.geometry, coal.Halfspace)
     )
 
@@ -111,17 +118,27 @@ def _link_in_words(link: str) -> str:
 
 
 def sensing_bodies(obstacles: Sequence[Body], distance: float) -> tuple[Body, ...]:
-    """Return all that is within a distance [m] of each obstacle; none may be a half-space."""
+    """Return all that is within a distance [m] of each obstacle but clouds, none a half-space."""
     return tuple(
         replace(body, mesh=sphere_swept_hull(points, radius + distance), color=SENSING)
         for body in obstacles
+        if not body.is_cloud
         for points, radius in [extreme_points(body.shape)]
     )
 
 
-def _items(scene: Scene, origin: ArrayLike) -> Iterator[pin.GeometryObject]:
+def _items(scene: Scene, origin: ArrayLike) -> Iterator[tuple[Obstacle, pin.GeometryObject]]:
     for obstacle in scene:
-        yield from geometry_objects(obstacle, origin=origin)
+        for item in geometry_objects(obstacle, origin=origin):
+            yield obstacle, item
+
+
+def _drawn(obstacle: Obstacle, item: pin.GeometryObject) -> Body:
+    if isinstance(obstacle, PointCloud):
+        every = -(-len(obstacle.points) // _MOST_POINTS)
+        mesh = octahedra(obstacle.points[::every], _DRAWN_SHARE * obstacle.radius)
+        return Body(item.name, WORLD, item.placement, mesh, OBSTACLE, item.geometry, is_cloud=True)
+    return _body(item, OBSTACLE)
 
 
 def _board(item: pin.GeometryObject, middle: Array, width: float) -> Body:

@@ -63,6 +63,24 @@ def sphere_swept_hull(points: Array, radius: float) -> TriangleMesh:
     return _smooth(vertices, faces) if radius > 0.0 else _creased(vertices, faces)
 
 
+def octahedra(points: Array, radius: float) -> TriangleMesh:
+    """Return an octahedron of a radius [m] about each of points (N, 3) [m]."""
+    corners = np.vstack([np.eye(3), -np.eye(3)])
+    x, y, z = np.meshgrid([0, 3], [1, 4], [2, 5], indexing="ij")
+    faces = np.column_stack([x.ravel(), y.ravel(), z.ravel()])
+    turned = np.linalg.det(corners[faces]) < 0.0
+    faces[turned] = faces[turned][:, ::-1]
+    vertices = (points[:, np.newaxis] + radius * corners).reshape(-1, 3)
+    first = len(corners) * np.arange(len(points))
+    return TriangleMesh(
+        vertices,
+        np.tile(corners, (len(points), 1)),
+        (first[:, np.newaxis, np.newaxis] + faces).reshape(-1, 3),
+        np.zeros((0, 2, 3)),
+        is_smooth=False,
+    )
+
+
 def tube(points: Array, radius: float, colors: Array) -> TriangleMesh:
     """Return a tube of a radius [m] along points (N, 3) [m], no two neighbours the same.
 

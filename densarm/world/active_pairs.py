@@ -102,19 +102,24 @@ class ActivePairs:
         self._updates_kinematics = kinematics is None
         self.kinematics = kinematics or Kinematics(arm)
         """Placements and Jacobian at the last update."""
-        self._queries = PairQueries(arm.model, self._geometry, world.pair_shapes, remembers=False)
+        self._queries = PairQueries(arm.model, world, remembers=False)
         self._geometry_data = self._queries.data
         self.rows: Array = self._queries.rows
         """[distance, normal, point 1, point 2] (K, 10) [m]; old where a pair is asleep."""
-        # Rows: awake, the version of `World.changes` that was queried, and a workspace.
-        self._pair_states = np.array([[_AWAKE], [_NEVER], [0]]).repeat(world.n_pairs, axis=1)
+        # Rows: awake, the version of `World.changes` that was queried, a workspace, awake pairs.
+        self._pair_states = np.array([[_AWAKE], [_NEVER], [0], [0]]).repeat(world.n_pairs, axis=1)
         self.state: NDArray[np.int64] = self._pair_states[0]
         """Nonzero where a pair is awake (K,)."""
         # Second row: after the joints have gone a way s and the obstacle w, the distance is at
         # least level - lipschitz @ s - w. Third row: w at the last update.
         self._pair_numbers = np.zeros((3, world.n_pairs))
         self.reach: Array = self._pair_numbers[0]
-        """Distance up to which each pair is awake (K,) [m], which may be changed in place."""
+        """Distance up to which each pair is awake (K,) [m], to be changed by `set_reach`."""
+        self.listed: NDArray[np.int64] = self._pair_states[3]
+        """The pairs that were awake at the last update, in their order; as many as `n_awake`."""
+        self.n_awake = 0
+        self._blocks = pair_blocks(world.lipschitz)
+        self._version = 0
         self._bounds: Array | None = None
         self._joint_numbers, rest = joint_numbers(arm), pin.neutral(arm.model)
         self._arrays: tuple[Any, ...] = (
@@ -127,6 +132,7 @@ class ActivePairs:
             self._pair_states,
             world.changes,
             world.obstacle_way,
+            self._blocks,
         )
         self._wake = entry_point(_wake, any_vector, *self._arrays)
         self.update(rest)  # kernels are loaded, or compiled, before a control loop
@@ -151,17 +157,28 @@ class ActivePairs:
         data.activateCollisionPair(pair)
         self._queries.ask(np.array([pair]))
         self.state[pair] = _AWAKE
+        self._blocks[pair // BLOCK, 0] = -np.inf
         self.distance[pair] = self.rows[pair, 0]
         return True
+
+    def set_reach(self, reach: float | Array) -> None:
+        """Let pairs be awake up to other distances from now on, one for all or (K,) [m]."""
+        self.reach[:] = reach
+        self._blocks[:, 0] = -np.inf
 
     def wake_all(self) -> None:
         """Query every pair at the next update."""
         self._pair_states[1] = _NEVER
+        self._blocks[:, 0] = -np.inf
 
     def update(self, q: Array) -> None:
         """Query the pairs that may be within reach at q (nq,), and some others."""
         data = self._geometry_data
+        if self._version != self.world.version:
+            self._version = self.world.version
+            self._blocks[:, 0] = -np.inf
         n_awake, n_changed = self._wake(np.asarray(q, np.float64), *self._arrays)
+        self.n_awake = n_awake
         self._bounds = None
         for k in self._pair_states[2, :n_changed].tolist() if n_changed else ():
             if k >= 0:
@@ -172,7 +189,7 @@ class ActivePairs:
             self.kinematics.update(q)
         if n_awake:
             self._place_shapes(data)
-            self._queries.ask_active()
+            self._queries.ask_active(self.listed[:n_awake])
 
     def _place_shapes(self, data: pin.GeometryData) -> None:
         kinematics = self.kinematics
@@ -207,35 +224,78 @@ def _wake(
     pair_states: NDArray[np.int64],
     changes: NDArray[np.int64],
     obstacle_way: Array,
+    blocks: Array,
 ) -> tuple[int, int]:
     """Decide which pairs are awake at q; return how many, and how many changed.
 
-    Into the last row of `pair_states` go the indices of pairs that wake, and the complements of
-    those that fall asleep.
+    Into the last rows of `pair_states` go the indices of pairs that wake, and the complements of
+    those that fall asleep, and then all that are awake.
     """
     reach, level, moved = pair_numbers[0], pair_numbers[1], pair_numbers[2]
-    state, seen, changed = pair_states[0], pair_states[1], pair_states[2]
+    state, seen, changed, listed = pair_states[0], pair_states[1], pair_states[2], pair_states[3]
     wakes_all = not go(q, q_last, joint_index, joint_numbers)
     way, step = joint_numbers[0], joint_numbers[1]
     n_awake, n_changed = 0, 0
-    for k in range(state.shape[0]):
-        before, now, change = state[k], _AWAKE, changes[k]
-        if change < 0:  # spare
-            now, level[k] = _ASLEEP, np.inf
-        elif change == seen[k] and not wakes_all:
-            by_joints = pair_motion(lipschitz, k, way)
-            if before == _AWAKE:
-                level[k] = rows[k, 0] + (by_joints - pair_motion(lipschitz, k, step)) + moved[k]
-            gone = by_joints + obstacle_way[k]
-            # A sleep of a few steps saves nothing, but pairs that close to their reach are few.
-            if level[k] - gone > reach[k] + 2.0 * DISTANCE_TOLERANCE:
-                now = _ASLEEP
-        state[k], seen[k], moved[k] = now, change, obstacle_way[k]
-        n_awake += now
-        if now != before:
-            changed[n_changed] = k if now == _AWAKE else ~k
-            n_changed += 1
+    for block in range(blocks.shape[0]):
+        if block_left(blocks, block, way) > 0.0 and not wakes_all:
+            continue
+        left = np.inf
+        for k in range(block * BLOCK, min((block + 1) * BLOCK, state.shape[0])):
+            before, now, change = state[k], _AWAKE, changes[k]
+            if change < 0:  # spare
+                now, level[k] = _ASLEEP, np.inf
+            elif change == seen[k] and not wakes_all:
+                by_joints = pair_motion(lipschitz, k, way)
+                if before == _AWAKE:
+                    level[k] = rows[k, 0] + (by_joints - pair_motion(lipschitz, k, step)) + moved[k]
+                gone = by_joints + obstacle_way[k]
+                # A sleep of a few steps saves nothing, but pairs so close to their reach are few.
+                if level[k] - gone > reach[k] + 2.0 * DISTANCE_TOLERANCE:
+                    now = _ASLEEP
+            state[k], seen[k], moved[k] = now, change, obstacle_way[k]
+            if now == _AWAKE:
+                listed[n_awake], left = k, -np.inf
+                n_awake += 1
+            else:
+                gone = pair_motion(lipschitz, k, way) + obstacle_way[k]
+                left = min(left, level[k] - gone - reach[k] - 2.0 * DISTANCE_TOLERANCE)
+            if now != before:
+                changed[n_changed] = k if now == _AWAKE else ~k
+                n_changed += 1
+        write_block(blocks, block, left, way)
     return n_awake, n_changed
+
+
+BLOCK = 32
+"""Pairs of a block, which are passed over together where none can be near."""
+
+
+def pair_blocks(lipschitz: Array) -> Array:
+    """Return a row for each block of pairs (B, 1 + 2 nv), given Lipschitz constants (K, nv).
+
+    It has minus infinity, since nothing is known of their distances, the largest of each constant,
+    and the way that the joints had gone when something was known.
+    """
+    starts = np.arange(0, len(lipschitz), BLOCK)
+    largest = np.maximum.reduceat(lipschitz, starts) if len(starts) else lipschitz
+    return np.column_stack([np.full(len(starts), -np.inf), largest, np.zeros_like(largest)])
+
+
+@compiled_part
+def block_left(blocks: Array, block: int, way: Array) -> float:
+    """Return what is left of a block's least distance after the joints have gone a way (nv,)."""
+    left: float = blocks[block, 0]
+    for j in range(way.shape[0]):
+        left -= blocks[block, 1 + j] * (way[j] - blocks[block, 1 + way.shape[0] + j])
+    return left
+
+
+@compiled_part
+def write_block(blocks: Array, block: int, left: float, way: Array) -> None:
+    """Write what is left of a block's least distance [m] after the joints have gone a way (nv,)."""
+    blocks[block, 0] = left
+    for j in range(way.shape[0]):
+        blocks[block, 1 + way.shape[0] + j] = way[j]
 
 
 @compiled_part

@@ -14,14 +14,27 @@ from numpy.typing import NDArray
 
 from densarm.arms.arm import Arm
 from densarm.arms.joint_space import compose, joint_rows, place_joints, pose_row
+from densarm.scene.point_cloud import PointCloud
+from densarm.scene.point_tree import PointTree
 from densarm.scene.shapes import box_hull, convex_hull, extreme_points
 from densarm.values.arrays import Array
 from densarm.values.kernels import compiled_part
+from densarm.world.hulls import Neighbours, cover, edge_table, neighbours
+from densarm.world.simplex import Integers
 from densarm.world.world import World
 
 _WIDEST = 1e3  # [m], of the cube that stands for a half-space
 
-Integers = NDArray[np.int64]
+
+class Clouds(NamedTuple):
+    """Trees of points, one tree after the other, each as `PointTree` has it."""
+
+    points: Array
+    """Points (N, 3) [m]."""
+    boxes: Array
+    """Boxes of nodes (M, 6) [m]."""
+    first: Integers
+    """First point and first node of each tree, and those after the last (C + 1, 2)."""
 
 
 class Bodies(NamedTuple):
@@ -47,6 +60,15 @@ class Bodies(NamedTuple):
 
     If one of them is fixed to that joint, as it is in a chain, it is the second.
     """
+    clouds: Clouds
+    """The point clouds, each in the frame of its bodies."""
+    cloud: Integers
+    """Index of the cloud that a body stands for, -1 if it is a hull (S,)."""
+    covers: Array
+    """Balls that cover each link's hull, where there are clouds: middle in its body's frame, and
+    radius, without that by which the hull is enlarged (B, 4) [m]."""
+    first_cover: Integers
+    """First ball of each body, and that after the last (S + 1,)."""
 
 
 BOX, BALL, RADIUS, LIPSCHITZ = 12, 15, 16, 17
@@ -74,17 +96,18 @@ def _bodies(world: World) -> tuple[Bodies, Integers]:
     hulls = [_hull(item.geometry) for item in shapes]
     corners, radii = zip(*map(extreme_points, hulls), strict=True)
     own = _NEIGHBOURS.setdefault(world.arm, {})
-    neighbours = [
-        own.get(item.name) or _neighbours(hull, len(each), radius)
+    near = [
+        own.get(item.name) or neighbours(hull, each, radius)
         for item, hull, each, radius in zip(shapes, hulls, corners, radii, strict=True)
     ]
     own |= {
-        item.name: near
-        for item, near in zip(shapes, neighbours, strict=True)
-        if item.parentJoint > 0
+        item.name: each for item, each in zip(shapes, near, strict=True) if item.parentJoint > 0
     }
     first, radius = np.cumsum([0, *map(len, corners)]), np.array(radii)
     low, high = (np.array([end(each, axis=0) for each in corners]) for end in (np.min, np.max))
+    cloud, trees = _cloud_trees(world)
+    for c, tree in enumerate(trees):
+        low[cloud == c], high[cloud == c] = tree.boxes[0, :3], tree.boxes[0, 3:]
     middles = 0.5 * (low + high)
     centred = [each - middle for each, middle in zip(corners, middles, strict=True)]
     frames = [
@@ -92,6 +115,8 @@ def _bodies(world: World) -> tuple[Bodies, Integers]:
         for item, middle in zip(shapes, middles, strict=True)
     ]
     reach = np.array([np.linalg.norm(each, axis=1).max() for each in centred]) + radius
+    for c, tree in enumerate(trees):
+        reach[cloud == c] += 0.5 * np.linalg.norm(np.ptp(tree.boxes[0].reshape(2, 3), axis=0))
     box = 0.5 * (high - low) + radius[:, np.newaxis]
     joint = np.array([item.parentJoint for item in shapes], dtype=np.int64)
     supports = [set(above) for above in model.supports]
@@ -99,16 +124,44 @@ def _bodies(world: World) -> tuple[Bodies, Integers]:
     last = np.array(shared, dtype=np.int64)
     is_first = joint[world.pair_shapes[:, :1]] == last[:, np.newaxis]
     pairs = np.where(is_first, world.pair_shapes[:, ::-1], world.pair_shapes)
+    covers = [
+        cover(points, edges) if trees and item.parentJoint > 0 else np.zeros((0, 4))
+        for points, edges, item in zip(centred, near, shapes, strict=True)
+    ]
     bodies = Bodies(
         parent=np.array(list(model.parents), dtype=np.int64),
         joints=joint_rows(model),
         joint=joint,
         shapes=np.column_stack([np.array(frames), box, reach, radius, world.shape_lipschitz]),
         points=np.vstack(centred),
-        edges=_edges(neighbours, first),
+        edges=edge_table(near, first),
         pairs=np.column_stack([pairs, last]),
+        clouds=_joined(trees),
+        cloud=cloud,
+        covers=np.vstack([np.zeros((0, 4)), *covers]),
+        first_cover=np.cumsum([0, *map(len, covers)]),
     )
     return bodies, first[pairs]
+
+
+def _cloud_trees(world: World) -> tuple[Integers, list[PointTree]]:
+    """Return which cloud each body stands for, else -1 (S,), and the trees of the clouds."""
+    cloud, trees = np.full(world.geometry_model.ngeoms, -1), list[PointTree]()
+    for slot in world.clouds:
+        if isinstance(slot.obstacle, PointCloud):
+            cloud[world.pair_shapes[slot.pairs, 1]] = len(trees)
+            trees.append(slot.obstacle.tree)
+    return cloud, trees
+
+
+def _joined(trees: list[PointTree]) -> Clouds:
+    points, boxes = [np.zeros((0, 3))], [np.zeros((0, 6))]
+    for tree in trees:
+        middle = 0.5 * (tree.boxes[0, :3] + tree.boxes[0, 3:])
+        points.append(tree.points - middle)
+        boxes.append(tree.boxes - np.tile(middle, 2))
+    first = np.cumsum([[len(a), len(b)] for a, b in zip(points, boxes, strict=True)], axis=0)
+    return Clouds(np.vstack(points), np.vstack(boxes), first)
 
 
 def _hull(shape: coal.CollisionGeometry) -> coal.CollisionGeometry:
@@ -128,25 +181,8 @@ def _pose(item: pin.GeometryObject) -> pin.SE3:
     return pin.SE3(turn, (shape.d + normal @ pose.translation) * normal)
 
 
-_Neighbours = tuple[Integers, Integers]
-"""Numbers of neighbours of a hull's corners, and the neighbours, one corner after the other."""
-
 # coal tells them corner by corner, and an arm among obstacles that move is made anew each time.
-_NEIGHBOURS: WeakKeyDictionary[Arm, dict[str, _Neighbours]] = WeakKeyDictionary()
-
-
-def _neighbours(hull: coal.CollisionGeometry, corners: int, radius: float) -> _Neighbours:
-    """Return a hull's neighbours; all corners of a round shape are each other's."""
-    found = [hull.neighbors(k) if radius == 0.0 else range(corners) for k in range(corners)]
-    return np.array([*map(len, found)]), np.concatenate([*map(np.array, found)])
-
-
-def _edges(neighbours: list[_Neighbours], first: Integers) -> Integers:
-    """Return `Bodies.edges`."""
-    counts = np.concatenate([count for count, _ in neighbours])
-    ends = len(counts) + 1 + np.append(0, np.cumsum(counts))
-    others = [begin + near for begin, (_, near) in zip(first, neighbours, strict=False)]
-    return np.concatenate([ends, *others]).astype(np.int64)
+_NEIGHBOURS: WeakKeyDictionary[Arm, dict[str, Neighbours]] = WeakKeyDictionary()
 
 
 @compiled_part

@@ -14,6 +14,7 @@ from densarm.world.swept_check import SweptCheck
 from densarm.world.world import World
 
 _DRAWS = 10_000
+_TOLD = 2  # links in a cloud
 
 
 def infeasibility(check: SweptCheck, ends: Mapping[str, Array]) -> str:
@@ -95,6 +96,17 @@ def _holding_faults(arm: Arm, q: Array) -> Iterator[str]:
 
 def _contact_faults(check: SweptCheck, q: Array) -> Iterator[str]:
     distance, pairs = check.world.distances(q), check.world.pairs
-    for k in np.argsort(distance)[: int((distance <= check.margin).sum())]:
+    clouds = {slot.obstacle.name: list[int]() for slot in check.world.clouds}
+    for k in np.argsort(distance)[: int((distance <= check.margin).sum())].tolist():
+        if distance[k] <= 0.0 and pairs[k][1] in clouds:
+            clouds[pairs[k][1]].append(k)
+            continue
         pair, gap = " and ".join(pairs[k]), distance[k] * 1e3
         yield f"{pair} overlap by {-gap:.3g} mm" if gap <= 0.0 else f"{pair} are {gap:.3g} mm apart"
+    for name, inside in clouds.items():
+        if inside:
+            links = ", ".join(pairs[k][0] for k in inside[:_TOLD])
+            more = f" and {len(inside) - _TOLD} more" if len(inside) > _TOLD else ""
+            gap = 1e3 * distance[inside[0]]
+            hint = "are its points the arm's own? A CloudFilter takes them out"
+            yield f"{links}{more} overlap the cloud {name} by up to {-gap:.3g} mm: {hint}"

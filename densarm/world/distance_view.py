@@ -79,10 +79,18 @@ def shape_positions(geometry_data: pin.GeometryData) -> Array:
 
     They are members of the elements of one C++ vector.
     """
-    views = [placement.translation for placement in geometry_data.oMg]
+    return _members([placement.translation for placement in geometry_data.oMg])
+
+
+def shape_rotations(geometry_data: pin.GeometryData) -> Array:
+    """Return the rotations of all shapes' frames (S, 3, 3) likewise."""
+    return _members([placement.rotation for placement in geometry_data.oMg])
+
+
+def _members(views: list[Array]) -> Array:
     begin = [view.__array_interface__["data"][0] for view in views[:2]]
-    stride = (begin[-1] - begin[0], 8)
-    return np.lib.stride_tricks.as_strided(views[0], (len(views), 3), stride)
+    strides = (begin[-1] - begin[0], *views[0].strides)
+    return np.lib.stride_tricks.as_strided(views[0], (len(views), *views[0].shape), strides)
 
 
 @compiled

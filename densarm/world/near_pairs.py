@@ -5,7 +5,15 @@ from numpy.typing import NDArray
 
 from densarm.values.arrays import Array
 from densarm.values.kernels import compiled
-from densarm.world.active_pairs import go, joint_numbers, pair_motion
+from densarm.world.active_pairs import (
+    BLOCK,
+    block_left,
+    go,
+    joint_numbers,
+    pair_blocks,
+    pair_motion,
+    write_block,
+)
 from densarm.world.world import DISTANCE_TOLERANCE, Pairs, World
 
 _SLACK = 0.02  # [m] beyond the smallest distance, up to which pairs are asked that may soon have it
@@ -39,6 +47,7 @@ class NearPairs:
             *(rest, index, world.lipschitz, joints, self._numbers, self._asked),
             *(world.changes, world.obstacle_way),
         )
+        self._blocks, self._version = pair_blocks(world.lipschitz), 0
         self._question = 0
 
     def below(self, q: Array, limit: float | Array) -> tuple[Pairs, Array]:
@@ -68,10 +77,14 @@ class NearPairs:
         """Ask pairs that may be below a limit [m]; return them, all rows, and the nearest."""
         world, numbers = self._world, self._numbers
         self._limit[:] = limit
-        count = _may_be_below(q, self._limit, self._question, *self._arrays)
+        if self._version != world.version:
+            self._version = world.version
+            self._blocks[:, 0] = -np.inf
+        most = float(np.max(limit, initial=-np.inf))
+        count = _may_be_below(q, self._limit, most, self._question, self._blocks, *self._arrays)
         pairs = self._asked[1, :count]
         rows = world.query(q, pairs)
-        return pairs, rows, _learn(rows, pairs, numbers)
+        return pairs, rows, _learn(rows, pairs, numbers, self._blocks)
 
 
 def least_distances(world: World, q: Array, limit: float) -> Array:
@@ -103,7 +116,9 @@ def smallest_distances(world: World, q: Array, time: Array | None = None) -> Arr
 def _may_be_below(
     q: Array,
     limit: Array,
+    most: float,
     question: int,
+    blocks: Array,
     q_last: Array,
     joint_index: NDArray[np.int64],
     lipschitz: Array,
@@ -116,25 +131,32 @@ def _may_be_below(
     """Go on to q; write which pairs have not been asked for a question, and are to be: how many."""
     level, gone, count = numbers[0], numbers[1], 0
     holds = go(q, q_last, joint_index, joints)
-    for k in range(level.shape[0]):
-        if changes[k] < 0:  # spare
-            level[k] = np.inf
-        elif not holds or changes[k] != asked[2, k]:
-            level[k] = -np.inf
-        asked[2, k] = changes[k]
-        gone[k] = pair_motion(lipschitz, k, joints[0]) + obstacle_way[k]
-        if asked[0, k] != question and level[k] - gone[k] - 2.0 * DISTANCE_TOLERANCE < limit[k]:
-            asked[0, k], asked[1, count] = question, k
-            count += 1
+    for block in range(blocks.shape[0]):
+        if holds and block_left(blocks, block, joints[0]) - 2.0 * DISTANCE_TOLERANCE >= most:
+            continue
+        least = np.inf
+        for k in range(block * BLOCK, min((block + 1) * BLOCK, level.shape[0])):
+            if changes[k] < 0:  # spare
+                level[k] = np.inf
+            elif not holds or changes[k] != asked[2, k]:
+                level[k] = -np.inf
+            asked[2, k] = changes[k]
+            gone[k] = pair_motion(lipschitz, k, joints[0]) + obstacle_way[k]
+            least = min(least, level[k] - gone[k])
+            if asked[0, k] != question and level[k] - gone[k] - 2.0 * DISTANCE_TOLERANCE < limit[k]:
+                asked[0, k], asked[1, count] = question, k
+                count += 1
+        write_block(blocks, block, least, joints[0])
     return count
 
 
 @compiled
-def _learn(rows: Array, pairs: Pairs, numbers: Array) -> tuple[float, int]:
+def _learn(rows: Array, pairs: Pairs, numbers: Array, blocks: Array) -> tuple[float, int]:
     """Bound distances of pairs from now on; return the smallest and the pair that has it."""
     smallest, nearest = np.inf, -1
     for k in pairs:
         numbers[0, k] = rows[k, 0] + numbers[1, k]
+        blocks[k // BLOCK, 0] = -np.inf  # to be found anew
         if rows[k, 0] < smallest:
             smallest, nearest = rows[k, 0], k
     return smallest, nearest

@@ -1,6 +1,9 @@
 """ChangingObstacles: obstacles that are moved, added and removed in a geometry model that stays."""
 
 import math
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import cached_property
 
 import numpy as np
 import pinocchio as pin
@@ -8,9 +11,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from densarm.errors import InvalidValueError, SceneChangedError, UnknownNameError
 from densarm.scene.obstacles import Obstacle
+from densarm.scene.point_cloud import PointCloud
 from densarm.scene.scene import Scene
 from densarm.values.arrays import Array
 from densarm.values.checks import finite_number, non_negative
+from densarm.world.hulls import Hulls, hulls_of
 from densarm.world.placed_obstacle import PlacedObstacle, checked_velocity
 
 _LONGEST_WAY = 1e4  # [m], beyond which sums of small steps would round off too much
@@ -23,6 +28,7 @@ class ChangingObstacles:
         geometry_model: holds the obstacles' shapes last, in their order.
         pair_shapes: indices of the two shapes of each pair (K, 2).
         scene: the obstacles, all of them present.
+        counts: how many shapes each of them has.
         origin: point of the world that is the origin of the geometry model (3,) [m].
     """
 
@@ -31,6 +37,7 @@ class ChangingObstacles:
         geometry_model: pin.GeometryModel,
         pair_shapes: NDArray[np.int64],
         scene: Scene,
+        counts: Sequence[int],
         origin: Array,
     ) -> None:
         self.geometry_model = geometry_model
@@ -54,19 +61,30 @@ class ChangingObstacles:
         self._origin = np.append(origin, np.zeros(4))  # of poses
         self._spare: list[PlacedObstacle] = []
         self._present: dict[str, PlacedObstacle] = {}
-        end = len(self._shapes) - sum(len(item.convex_shapes()) for item in scene)
-        for obstacle in scene:
-            begin, end = end, end + len(obstacle.convex_shapes())
-            own = np.flatnonzero((pair_shapes >= begin) & (pair_shapes < end)) // 2
-            pairs = slice(own[0], own[-1] + 1) if own.size else slice(0)
+        self.clouds: list[PlacedObstacle] = []
+        """Those that are point clouds, present or spare."""
+        end = len(self._shapes) - sum(counts)
+        # Pairs are in the order of the obstacles' shapes.
+        last = np.maximum.accumulate(pair_shapes.max(axis=1, initial=-1))
+        for obstacle, count in zip(scene, counts, strict=True):
+            begin, end = end, end + count
+            pairs = slice(*np.searchsorted(last, [begin, end]).tolist())
             ways, twists = self.obstacle_way[pairs], self.twist[pairs]
             slot = PlacedObstacle(self._shapes[begin:end], pairs, ways, twists)
             slot.hold(obstacle, self._origin)
             self.has_motion[pairs] = obstacle.motion is not None
             self._present[obstacle.name] = slot
+            if isinstance(obstacle, PointCloud):
+                self.clouds.append(slot)
         self._moving: list[PlacedObstacle] | None = None
         self._scene: Scene | None = None
         self._pairs: tuple[tuple[str, str], ...] | None = None
+
+    @cached_property
+    def link_hulls(self) -> Hulls:
+        """The hulls of the shapes up to the last that a cloud is paired with."""
+        facing = np.concatenate([self.pair_shapes[slot.pairs, 0] for slot in self.clouds])
+        return hulls_of([item.geometry for item in self._shapes[: facing.max(initial=0) + 1]])
 
     @property
     def scene(self) -> Scene:
@@ -144,6 +162,30 @@ class ChangingObstacles:
             slot.obstacle, self._moving = slot.present(), None
             self.has_motion[slot.pairs] = False
         self._put(slot, told, velocity, time)
+
+    def update_cloud(self, name: str, points: ArrayLike) -> None:
+        """Put other points in the place of a cloud's, as its camera sees them now.
+
+        It may be called in a thread of its own while a control loop runs: the new points are ready
+        before the loop hears of them, which then asks for the distances of all links anew.
+
+        Args:
+            name: of the cloud.
+            points: in the cloud's frame, which stays where it is (N, 3) [m].
+
+        Raises:
+            UnknownNameError: no such obstacle.
+            InvalidValueError: it is no cloud, or as of a `PointCloud`; the old points stay then.
+        """
+        slot = self._slot(name)
+        if not isinstance(slot.obstacle, PointCloud):
+            raise InvalidValueError("obstacle", name, "a point cloud")
+        cloud = replace(slot.obstacle, points=points, path="")
+        _ = cloud.tree, cloud.reach  # made before anybody waits for them
+        slot.become(cloud)
+        self.version += 1
+        self.changes[slot.pairs] = self.version
+        self._scene = None
 
     def set_time(self, time: float) -> None:
         """Put every obstacle with a motion where it is at a time [s], its velocity told."""

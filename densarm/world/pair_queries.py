@@ -10,13 +10,16 @@ from numpy.typing import NDArray
 from densarm.scene.shapes import FARTHEST
 from densarm.values.arrays import Array
 from densarm.values.kernels import compiled
+from densarm.world.cloud_balls import CloudBalls
 from densarm.world.distance_view import DistanceView
+from densarm.world.obstacle_slots import ChangingObstacles
 
 COAL_TOLERANCE = 1e-10
 """GJK and EPA tolerance [m]; at coal's default of 1e-6 gradients err by up to 4e-3."""
 
 _LARGE = 10.0  # [m], radius of bodies of which a remembered guess may end at a wrong distance
 _LOOSEST = 1e-6  # tolerance [m]
+_FEW = 1000  # times as many pairs sleep as are awake where those are asked one by one
 _FAR = 10.0 * FARTHEST  # [m], beyond all distances that there are
 
 
@@ -29,8 +32,7 @@ class PairQueries:
 
     Args:
         model: moves the shapes.
-        geometry: the pairs, all present.
-        pair_shapes: indices of the two shapes of each pair (K, 2).
+        obstacles: the pairs, all present, and the clouds among them.
         remembers: whether each search begins where the pair's last one ended, unless a body is
             large. The last digits of distances depend on earlier queries then.
     """
@@ -38,10 +40,10 @@ class PairQueries:
     def __init__(
         self,
         model: pin.Model,
-        geometry: pin.GeometryModel,
-        pair_shapes: NDArray[np.int64],
+        obstacles: ChangingObstacles,
         remembers: bool,
     ) -> None:
+        geometry, pair_shapes = obstacles.geometry_model, obstacles.pair_shapes
         self._geometry = geometry
         self.data: pin.GeometryData = geometry.createData()
         """Pinocchio's data, whose placements are to be updated before a query."""
@@ -55,6 +57,7 @@ class PairQueries:
             request.gjk_tolerance = request.epa_tolerance = COAL_TOLERANCE
         _forget([self._requests[k] for k in np.flatnonzero(forgets)])
         pin.computeDistances(model, model.createData(), geometry, self.data, pin.neutral(model))
+        self._balls = CloudBalls(obstacles, self.data) if obstacles.clouds else None
         self._view = DistanceView(self.data)
         self.rows: Array = self._view.read()
         """[distance, normal, point 1, point 2] (K, 10) [m], each of the pair's last query."""
@@ -64,13 +67,20 @@ class PairQueries:
     def ask(self, pairs: NDArray[np.int64]) -> None:
         """Query some pairs (P,)."""
         geometry, data = self._geometry, self.data
+        if self._balls:
+            self._balls.place(pairs)
         for k in pairs.tolist():
             pin.computeDistance(geometry, data, k)
         if not _are_known(self._view.read(), pairs):
             self._ask_again()
 
-    def ask_active(self) -> None:
-        """Query the active pairs of the data, of which there are some."""
+    def ask_active(self, pairs: NDArray[np.int64]) -> None:
+        """Query some pairs (P,), which are all that are active in the data."""
+        if _FEW * len(pairs) < len(self._requests):
+            self.ask(pairs)  # passing over those that sleep would take longer
+            return
+        if self._balls:
+            self._balls.place(pairs)
         nearest = pin.computeDistances(self._geometry, self.data)
         # What stands for no distance is less than all others.
         if not self._view.read()[nearest, 0] > -_FAR:

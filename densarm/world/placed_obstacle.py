@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from densarm.scene.motion import ConstantVelocity
 from densarm.scene.obstacles import Capsule, Obstacle, Sphere, pose_fields
+from densarm.scene.point_cloud import PointCloud
 from densarm.scene.shapes import FARTHEST
 from densarm.values.arrays import Array
 from densarm.values.checks import finite_vector
@@ -51,24 +52,28 @@ class PlacedObstacle:
         if type(obstacle) is not type(self.obstacle):
             return False
         sizes = {item.name for item in fields(obstacle)} - {item.name for item in fields(Obstacle)}
-        return isinstance(obstacle, Sphere | Capsule) or all(
+        return isinstance(obstacle, Sphere | Capsule | PointCloud) or all(
             getattr(obstacle, size) == getattr(self.obstacle, size) for size in sizes
         )
 
     def hold(self, obstacle: Obstacle, origin: Array) -> None:
         """Become an obstacle, seen from a point of the world, as a pose (7,)."""
-        self.obstacle, self.told, self._reach = obstacle, None, obstacle.reach
-        geometry = self.shapes[0].geometry
-        if isinstance(obstacle, Sphere | Capsule):
-            geometry.radius = obstacle.radius
-        if isinstance(obstacle, Capsule):
-            geometry.halfLength = 0.5 * obstacle.length
-        one = len(self.shapes) == 1
+        self.become(obstacle)
+        self.told = None
+        is_one = len(self.shapes) == 1 or isinstance(obstacle, PointCloud)
         for k, shape in enumerate(self.shapes):
-            shape.name = obstacle.name if one else f"{obstacle.name}.{k}"
+            shape.name = obstacle.name if is_one else f"{obstacle.name}.{k}"
+            if isinstance(obstacle, Sphere | Capsule | PointCloud):
+                shape.geometry.radius = obstacle.radius
+            if isinstance(obstacle, Capsule):
+                shape.geometry.halfLength = 0.5 * obstacle.length
         pose = np.array([*obstacle.position, *obstacle.orientation_xyzw])
         self.put(pose - origin, obstacle.velocity_at(0.0), None)
         self.gone = self._ways[:] = 0.0
+
+    def become(self, obstacle: Obstacle) -> None:
+        """Take another of the same shapes' place, at the pose that it has."""
+        self.obstacle, self._reach = obstacle, obstacle.reach
 
     @property
     def seen_at(self) -> float:

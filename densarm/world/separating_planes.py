@@ -14,18 +14,23 @@ from densarm.world.bodies import (
     BOX,
     RADIUS,
     Bodies,
-    Integers,
     bodies_of,
     place,
     write_motion_bounds,
 )
-from densarm.world.separation import climb, separation
+from densarm.world.cloud_field import Arc, Fields, field_bound, fields_of
+from densarm.world.cloud_separation import unproved_halves
+from densarm.world.separation import climb, separation, stays_apart
+from densarm.world.simplex import Integers
 from densarm.world.world import DISTANCE_TOLERANCE, World
 
 _FLOOR = 1e-4  # [rad or m], length of a segment at which one not proved clear counts as not clear
 _FIRST = 8  # pairs that were not clear lately, which are looked at before all others
 # What is known of a pair on an arc, where it is not which face of a box is between its bodies.
 _PROVED, _NOTHING, _PLANE = -3, -2, -1
+_OPEN = -3  # less 1, 2 or 3: of a cloud, what is not proved is one half, the other, or both
+_BOTH = 3
+_SHORTEST = 0.04  # part of an arc that a field is asked for; nearer to a cloud it costs too many
 
 
 class Tube(NamedTuple):
@@ -94,7 +99,8 @@ class SeparatingPlanes:
         self._least = np.full(world.n_pairs, least) + kept
         corners = np.full((world.n_pairs, 4, 2), -1)
         corners[:, 0] = some_corner
-        self._memory = _Memory(corners, np.flatnonzero(world.changes > 0))
+        order = np.flatnonzero(world.changes > 0)
+        self._memory = _Memory(corners, order, fields_of(world))
         nothing, rest = np.zeros(0, np.int64), np.zeros((2, world.arm.nv))
         # Kernels are loaded, or compiled, here rather than where a plan's time is taken.
         _polyline_is_clear(self._bodies, self._memory._replace(order=nothing), self._least, rest)
@@ -143,6 +149,8 @@ class _Memory(NamedTuple):
     """Corners of each pair (K, 4, 2) by which a plane was found, see `separation`."""
     order: Integers
     """The pairs in the order in which they are looked at; one that was not clear is put first."""
+    fields: Fields
+    """How far places are from clouds."""
 
 
 @compiled
@@ -199,6 +207,22 @@ def _polyline_is_clear(  # noqa: C901  # what is called at each level is compile
                             i, j, c = pairs[k, 0], pairs[k, 1], pairs[k, 2]
                             held = least[k] + shapes[i, RADIUS] + shapes[j, RADIUS]
                             half = 0.5 * (motion[i, c] + motion[j, c])
+                            if bodies.cloud[j] >= 0:
+                                on = Arc(i, j, held, half, bend[i, c] + bend[j, c])
+                                start, left = memory.corners[k, 0, 0], _BOTH
+                                if faces_are_done:
+                                    left = unproved_halves(bodies, poses, on, start)
+                                else:
+                                    far = field_bound(bodies, memory.fields, pose, on) - held
+                                    if far > half:
+                                        left = 0
+                                    elif far < _SHORTEST * half:
+                                        continue
+                                if left < 0:
+                                    _move_to_front(memory.order, k)
+                                    return False
+                                waiting[n, 2] = _OPEN - left
+                                continue
                             corners, plane, enough = memory.corners[k], planes[k], held + half
                             gap = separation(bodies, pose, i, j, held, enough, corners, work, plane)
                             gap -= held
@@ -215,7 +239,11 @@ def _polyline_is_clear(  # noqa: C901  # what is called at each level is compile
                     _look_at_ends(bodies, least, poses, bend, rows, planes)
                 for side in (0, 2):
                     for n in range(begin, end):
-                        if waiting[n, 2] == _PLANE:
+                        if waiting[n, 2] < _OPEN and (_OPEN - waiting[n, 2]) >> (side // 2) & 1:
+                            written = _write_half(
+                                halves, written, waiting[n, 0], 2 * arc + side // 2
+                            )
+                        elif waiting[n, 2] == _PLANE:
                             k, normal = waiting[n, 0], work[0]
                             i, j, c = pairs[k, 0], pairs[k, 1], pairs[k, 2]
                             _carry(joint_pose, joint_poses[side], c, planes[k], normal)
@@ -223,15 +251,20 @@ def _polyline_is_clear(  # noqa: C901  # what is called at each level is compile
                             start, ends = memory.corners[k, 0], halves[written]
                             gap = climb(bodies, poses[side], i, j, start, normal, ends)
                             gap -= least[k] + shapes[i, RADIUS] + shapes[j, RADIUS]
-                            if not _stays_apart(planes[k, 3], gap, bend[i, c] + bend[j, c]):
-                                halves[written, 0], halves[written, 1] = k, 2 * arc + side // 2
-                                halves[written, 2] = _NOTHING
-                                written += 1
+                            if not stays_apart(planes[k, 3], gap, bend[i, c] + bend[j, c]):
+                                written = _write_half(halves, written, k, 2 * arc + side // 2)
             if written > 0 and longest * share <= _FLOOR:
                 return False
             waiting = halves[:written]
             share *= 0.5
     return True
+
+
+@compiled_part
+def _write_half(halves: Integers, row: int, pair: int, arc: int) -> int:
+    """Write that a pair is not proved on an arc, and return the next row."""
+    halves[row, 0], halves[row, 1], halves[row, 2] = pair, arc, _NOTHING
+    return row + 1
 
 
 @compiled_part
@@ -292,7 +325,7 @@ def _look_at_ends(
             for side in (0, 2):
                 offset, extent = _across(bodies.shapes, i, j, face >> 1, poses[side])
                 beyond = (1.0 - 2.0 * (face & 1)) * offset - extent - least[k]
-                if not _stays_apart(planes[k, 3], beyond, bend[i, c] + bend[j, c]):
+                if not stays_apart(planes[k, 3], beyond, bend[i, c] + bend[j, c]):
                     rows[n, 2] = _NOTHING
 
 
@@ -319,18 +352,6 @@ def _carry(middle: Array, end: Array, joint: int, plane: Array, normal: Array) -
             along += middle[joint, 3 * row + column] * plane[row]
         for row in range(3):
             normal[row] += end[joint, 3 * row + column] * along
-
-
-@compiled_part
-def _stays_apart(gap_a: float, gap_b: float, bend: float) -> bool:
-    """Return whether a plane's gaps [m] at the middle and at an end of an arc prove that half.
-
-    On it β of the whole arc counts a quarter, since it takes half the time.
-    """
-    if not (gap_a > 0.0 and gap_b > 0.0):
-        return False
-    root = math.sqrt(gap_a) + math.sqrt(gap_b)
-    return bend < 8.0 * root * root
 
 
 @compiled_part

@@ -15,10 +15,12 @@ from densarm.arms.inverse_kinematics import InverseKinematics
 from densarm.arms.pose import Pose
 from densarm.errors import DensarmError, InvalidValueError
 from densarm.scene.obstacles import Obstacle, geometry_objects, numbered
+from densarm.scene.point_cloud import PointCloud
 from densarm.scene.scene import Scene
 from densarm.values.arrays import Array
 from densarm.values.checks import non_negative, non_negative_integer, positive_integer
 from densarm.values.documented import documented
+from densarm.world.cloud_balls import nearest_ball
 from densarm.world.distance_view import add_pair_gradients, pair_rates
 from densarm.world.lipschitz import joint_support, shape_lipschitz
 from densarm.world.obstacle_slots import ChangingObstacles
@@ -96,12 +98,12 @@ class World(ChangingObstacles):
     def __init__(self, arm: Arm, scene: Scene, spare: Iterable[Obstacle] = ()) -> None:
         self.arm = arm
         reserve = Scene([*scene, *spare], scene.attachments)
-        model = _geometry_model(arm, reserve)
+        model, counts = _geometry_model(arm, reserve)
         pair_shapes = [(pair.first, pair.second) for pair in model.collisionPairs]
         indices = np.array(pair_shapes, dtype=np.int64).reshape(-1, 2)
-        super().__init__(model, indices, reserve, arm.origin)
+        super().__init__(model, indices, reserve, counts, arm.origin)
         self.n_pairs = len(pair_shapes)
-        self._queries = PairQueries(arm.model, model, self.pair_shapes, remembers=True)
+        self._queries = PairQueries(arm.model, self, remembers=True)
         self._geometry_data, self._data = self._queries.data, arm.model.createData()
         # A view that follows the data; Pinocchio drops the second axis of a single column.
         self._jacobian = by_columns(self._data.J, (6, arm.nv))
@@ -121,7 +123,7 @@ class World(ChangingObstacles):
         """
         for obstacle in reserve.obstacles[len(scene) :]:
             self.remove_obstacle(obstacle.name)
-        self._is_spare = np.zeros(self.n_pairs, bool)
+        self._is_spare, self._there = np.zeros(self.n_pairs, bool), np.arange(self.n_pairs)
 
     def __repr__(self) -> str:
         return f"World({self.arm}, {self.scene}, {self.n_pairs} pairs)"
@@ -241,7 +243,7 @@ class World(ChangingObstacles):
 
     def _keeps(self, q: Array, margin: float) -> bool:
         """Return whether all pairs are farther apart than a margin [m] at q (nq,)."""
-        if margin > 0.0 or not self.spare_is_known:
+        if margin > 0.0 or not self.spare_is_known or self.clouds:
             return bool(self.distances(q).min(initial=np.inf) > margin)
         # Takes a quarter of the time that distances take.
         model, data = self.geometry_model, self._geometry_data
@@ -287,7 +289,7 @@ class World(ChangingObstacles):
         if pairs is not None and len(pairs) < self.n_pairs:
             self._queries.ask(pairs)
         elif not self._is_spare.all():
-            self._queries.ask_active()
+            self._queries.ask_active(self._there)
         return self._queries.rows
 
     def _skip_spare_pairs(self) -> None:
@@ -297,7 +299,7 @@ class World(ChangingObstacles):
                 self._geometry_data.deactivateCollisionPair(k)
             else:
                 self._geometry_data.activateCollisionPair(k)
-        self._is_spare = is_spare
+        self._is_spare, self._there = is_spare, np.flatnonzero(~is_spare)
 
 
 def base_overlaps(arm: Arm, scene: Scene) -> tuple[str, ...]:
@@ -307,20 +309,33 @@ def base_overlaps(arm: Arm, scene: Scene) -> tuple[str, ...]:
     arm stands in its table, or one of the two is not where it is said to be.
     """
     still = [item for item in arm.collision_model.geometryObjects if not item.parentJoint]
-    around = [x for obstacle in scene for x in geometry_objects(obstacle, origin=arm.origin)]
     found = []
-    for bodies in product(still, around):
-        poses = [coal.Transform3s(b.placement.rotation, b.placement.translation) for b in bodies]
-        first, second = zip((body.geometry for body in bodies), poses, strict=True)
-        # At coal's own tolerance of 1e-6 m: at tighter ones it may find no distance.
-        depth = -coal.distance(*first, *second, coal.DistanceRequest(), coal.DistanceResult())
-        if depth > _OVERLAP:
-            names = " is in ".join(repr(body.name) for body in bodies)
-            found.append(f"{names} by {1e3 * depth:.3g} mm")
+    for body, obstacle in product(still, scene):
+        for other in geometry_objects(obstacle, origin=arm.origin):
+            if isinstance(obstacle, PointCloud):
+                other.placement = nearest_ball(obstacle, other.placement, body)
+            depth = -_distance(body, other)
+            if depth > _OVERLAP:
+                names = f"{body.name!r} is in {other.name!r}"
+                found.append(f"{names} by {1e3 * depth:.3g} mm")
     return tuple(found)
 
 
-def _geometry_model(arm: Arm, scene: Scene) -> pin.GeometryModel:
+def _distance(first: pin.GeometryObject, second: pin.GeometryObject) -> float:
+    """Return the signed distance of two shapes that no joint moves [m]."""
+    one, other = (
+        coal.Transform3s(x.placement.rotation, x.placement.translation) for x in (first, second)
+    )
+    # At coal's own tolerance of 1e-6 m: at tighter ones it may find no distance.
+    request, result = coal.DistanceRequest(), coal.DistanceResult()
+    return float(coal.distance(first.geometry, one, second.geometry, other, request, result))
+
+
+def _geometry_model(arm: Arm, scene: Scene) -> tuple[pin.GeometryModel, list[int]]:
+    """Return all shapes and pairs, and how many shapes each obstacle has.
+
+    A cloud has a ball for each shape of the arm that moves, and is paired with it by that alone.
+    """
     for attachment in scene.attachments:
         if attachment not in arm.description.attachments:
             name, allowed = attachment.body.name, "held by the arm: arm.holding(*scene.attachments)"
@@ -338,13 +353,19 @@ def _geometry_model(arm: Arm, scene: Scene) -> pin.GeometryModel:
         for name in numbered(each.body.name, len(each.body.convex_shapes()))
         for obstacle in each.touch_obstacles
     }
+    counts, pairs = [], model.collisionPairs
     for obstacle in scene:
+        before = model.ngeoms
+        facing = [k for k in moving if (names[k], obstacle.name) not in touching]
         for item in geometry_objects(obstacle, origin=arm.origin):
             if model.existGeometryName(item.name):
                 allowed = f"other than the names of the shapes of {arm.name!r}"
                 raise InvalidValueError("obstacle name", item.name, allowed)
-            index = model.addGeometryObject(item)
-            for k in moving:
-                if (names[k], obstacle.name) not in touching:
-                    model.addCollisionPair(pin.CollisionPair(int(k), int(index)))
-    return model
+            alone = isinstance(obstacle, PointCloud) and len(facing) > 0
+            for links in [[k] for k in facing] if alone else [facing]:
+                index = model.addGeometryObject(item)
+                for k in links:
+                    # addCollisionPair would compare it with all others.
+                    pairs.append(pin.CollisionPair(int(k), int(index)))
+        counts.append(model.ngeoms - before)
+    return model, counts

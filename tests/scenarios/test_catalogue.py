@@ -1,6 +1,7 @@
 """What every scenario of the catalogue keeps to."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -12,9 +13,13 @@ from densarm.certificates.phases import body_poses
 from densarm.cli.list_known import list_known
 from densarm.scenarios.control import ControlForm
 from densarm.scenarios.scenario import Scenario, load_scenario
+from densarm.scene.point_cloud import PointCloud
+from densarm.scene.scene import Scene
 from densarm.simulation.run import Run
 from densarm.values.outcome import Outcome
+from densarm.world.near_pairs import smallest_distances
 from densarm.world.swept_check import SweptCheck
+from densarm.world.world import World
 
 pytestmark = pytest.mark.slow
 
@@ -90,6 +95,19 @@ def test_kinova_goes_the_short_way_round(catalogue_run: Callable[[str], Run]) ->
     assert abs(arm.angles(scenario.start)[0] + step[0]) > 3.15
     done = catalogue_run("kinova_posts")
     assert (done.outcome, done.certified) == (Outcome.REACHED, True), done.detail
+
+
+def test_a_shelf_that_cameras_saw_is_left(catalogue_run: Callable[[str], Run]) -> None:
+    done = catalogue_run("panda_shelf_cloud")
+    assert (done.outcome, done.certified) == (Outcome.REACHED, True), done.detail
+    # The shelf itself, of which the cloud saw what faces the cameras, is not touched either.
+    shelf = World(done.task.arm, loaded("panda_shelf").scene)
+    assert smallest_distances(shelf, done.q[::10]).min() > 0.0
+    # Points in its way, and the same run is none that was proved.
+    places = [done.task.arm.pose(q).position for q in done.q[::100]]
+    cloud = PointCloud(name="way", points=places, radius=0.01)
+    other = replace(done.task, scene=Scene([*done.task.scene, cloud]))
+    assert not replace(done, task=other).certified
 
 
 def test_a_part_is_carried_out_of_a_bin(catalogue_run: Callable[[str], Run]) -> None:

@@ -8,12 +8,14 @@ import pytest
 from densarm.arms.arm import Arm, load_arm
 from densarm.scene.mesh import Mesh
 from densarm.scene.obstacles import HalfSpace, Sphere
+from densarm.scene.point_cloud import PointCloud
 from densarm.scene.scene import Attachment, Scene
 from densarm.visualization.bodies import (
     WORLD,
     arm_bodies,
     half_space_bodies,
     obstacle_bodies,
+    sensing_bodies,
     spoken_names,
 )
 
@@ -76,3 +78,16 @@ def test_held_bodies_keep_their_names() -> None:
         "bar_0": "bar 0",
         "panda_hand_0": "hand",
     }
+
+
+def test_a_cloud_is_drawn_by_its_points() -> None:
+    points = np.array([[0.0, 0.0, 0.0], [1.0, 2.0, 3.0]])
+    cloud = PointCloud(name="cloud", points=points, radius=0.1, position=(1.0, 0.0, 0.0))
+    (body,) = obstacle_bodies(Scene([cloud]))
+    assert body.mesh.vertices.shape == (12, 3)
+    assert body.mesh.faces.shape == (16, 3)
+    np.testing.assert_allclose(body.mesh.vertices[6:].mean(axis=0), points[1], atol=1e-12)
+    np.testing.assert_array_equal(body.placement.translation, [1.0, 0.0, 0.0])
+    a, b, c = (body.mesh.vertices[body.mesh.faces[:8, k]] for k in range(3))
+    assert (np.einsum("ij,ij->i", np.cross(b - a, c - a), a) > 0.0).all()  # from outside
+    assert sensing_bodies((body,), 0.1) == ()

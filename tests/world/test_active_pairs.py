@@ -56,7 +56,7 @@ def walk(arm: Arm, seed: int, paces: list[str]) -> list[Array]:
 
 def within_reach(world: World, reach: float, kinematics: Kinematics | None = None) -> ActivePairs:
     pairs = ActivePairs(world, kinematics)
-    pairs.reach[:] = reach
+    pairs.set_reach(reach)
     return pairs
 
 
@@ -142,7 +142,7 @@ def test_longer_reach_wakes_at_once(world: World) -> None:
     for _ in range(2):
         pairs.update(q)
     assert (pairs.state == 0).any()
-    pairs.reach[:] = 10.0
+    pairs.set_reach(10.0)
     pairs.update(q)
     assert pairs.state.all()
 

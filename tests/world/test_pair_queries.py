@@ -23,7 +23,7 @@ ROBOTS = Path(
 
 def awake(world: World) -> ActivePairs:
     pairs = ActivePairs(world)
-    pairs.reach[:] = np.inf
+    pairs.set_reach(np.inf)
     return pairs
 
 

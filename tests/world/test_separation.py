@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 
 from densarm.scene.shapes import box_hull, convex_hull
 from densarm.values.arrays import Array
-from densarm.world.bodies import Integers
 from densarm.world.separation import ACCURACY, climb, separation
+from densarm.world.simplex import Integers
 
 pytestmark = pytest.mark.slow  # a kernel of its own is compiled
 
