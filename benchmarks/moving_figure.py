@@ -13,6 +13,7 @@ from typing import Any
 
 from densarm.values.proportion import Proportion
 from densarm.visualization.figure_style import (
+    BLACK,
     BLUE,
     GREEN,
     GREY,
@@ -28,6 +29,7 @@ COLOURS = {
     "density": BLUE,
     "damper_qp": VERMILION,
     "stop_and_go": GREY,
+    "plan_again": BLACK,
     "mink": ORANGE,
     "cbfpy": GREEN,
     "passive": PURPLE,
