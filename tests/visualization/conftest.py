@@ -158,7 +158,7 @@ class Page:
         return [event for event in self.events if event["method"] == method]
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="module")  # pages go on drawing beside other tests
 def open_page(
     chromium: str, tmp_path_factory: pytest.TempPathFactory
 ) -> Iterator[Callable[[str], Page]]:
