@@ -74,7 +74,7 @@ class PlanningParameters:
         positive("near_distance", self.near_distance)
         positive_integer("searches", self.searches)
         positive("extension", self.extension)
-        non_negative_integer("shortcuts", self.shortcuts)
+        positive_integer("shortcuts", self.shortcuts)
         if self.effort is not None:
             positive_integer("effort", self.effort)
         non_negative("limit_margin", self.limit_margin)
