@@ -1,7 +1,7 @@
 """Scenarios: from TOML, to a task and back, and every bad input answered in one line."""
 
 import json
-from dataclasses import asdict, replace
+from dataclasses import asdict, fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -133,14 +133,19 @@ def test_every_setting_survives_the_round_trip(swing_up: Scenario) -> None:
 def halved(parameters: Any) -> Any:
     """Return parameters with every number halved, but those that must be whole kept above 0.
 
-    What is zero or not given becomes 0.01.
+    What is zero or not given becomes 0.01, or 2 where it must be whole.
     """
     changes = {
         key: max(1, value // 2) if isinstance(value, int) else 0.5 * value or 0.01
         for key, value in asdict(parameters).items()
         if not isinstance(value, str | None)
     }
-    changes |= {key: 0.01 for key, value in asdict(parameters).items() if value is None}
+    types = {field.name: str(field.type) for field in fields(parameters)}
+    changes |= {
+        key: 2 if "int" in types[key] else 0.01
+        for key, value in asdict(parameters).items()
+        if value is None
+    }
     return replace(parameters, **changes)
 
 
