@@ -43,6 +43,7 @@ FLAGS = (
     "--no-sandbox",
     "--use-gl=swiftshader",
     "--enable-unsafe-swiftshader",
+    "--disable-gpu-watchdog",  # a busy machine takes its time, and would lose the page's context
     "--disable-background-networking",
     "--disable-component-update",
     "--disable-sync",
