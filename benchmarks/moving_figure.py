@@ -70,9 +70,9 @@ def main(arguments: list[str] | None = None) -> None:
             )
         axes.set_title(name)
         axes.set_xlabel("speed of the balls [m/s]")
-        axes.set_ylim(bottom=0.0)
         axes.grid(axis="y", alpha=0.3)
         axes.spines[["top", "right"]].set_visible(False)
+    panels[0].set_ylim(bottom=0.0)  # of all, once all is drawn
     panels[0].set_ylabel("trials with a contact [%]")
     figure.legend(drawn.values(), drawn, loc="outside upper center", ncols=len(drawn))
     save_figure(figure, options.figure)
