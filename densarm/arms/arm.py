@@ -211,6 +211,11 @@ class Arm:
             delta[..., joint] = np.arctan2(np.sin(turn), np.cos(turn))
         return delta
 
+    def unwrapped(self, q: Array) -> Array:
+        """Return joint positions (N, nv) along configurations (N, nq), on whole turns too."""
+        turned = np.cumsum(self.difference(q[:-1], q[1:]), axis=0)
+        return np.asarray(self.angles(q[0]) + np.vstack([np.zeros(self.nv), turned]))
+
     def integrate(self, q: Array, step: Array) -> Array:
         """Return q ⊕ step: the configurations (..., nq) that tangent vectors lead to.
 

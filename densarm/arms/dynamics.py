@@ -5,6 +5,7 @@ import pinocchio as pin
 
 from densarm.arms.arm import Arm
 from densarm.values.arrays import Array
+from densarm.values.kernels import compiled_part
 
 
 class Kinematics:
@@ -38,6 +39,13 @@ def by_columns(matrix: Array, shape: tuple[int, int]) -> Array:
     """
     stride = matrix.itemsize * max(shape[0], 2)
     return np.lib.stride_tricks.as_strided(matrix, shape, (matrix.itemsize, stride))
+
+
+@compiled_part
+def mass_entry(mass: Array, i: int, j: int) -> float:
+    """Return an entry of M, of which Pinocchio fills the upper triangle."""
+    entry: float = mass[i, j] if i <= j else mass[j, i]
+    return entry
 
 
 class JointTorques:

@@ -10,7 +10,9 @@ from densarm.control.controller import Controller
 from densarm.planning.motion import Motion
 from densarm.values.arrays import Array
 
-_USED_SHARE = 0.9  # of a motion's tube, which the arm may use
+USED_SHARE = 0.9
+"""Of a motion's tube, which the arm may use."""
+
 _RESUMING_SHARE = 0.8  # of it, or of the distance, from where a controller may go on
 _LOST = 0.5  # [rad or m] off, from where no controller is left to return to its motion
 
@@ -87,7 +89,7 @@ class Course:
         wanted = self._arm.configurations(self.pausing.reference)
         error = np.abs(self._arm.difference(wanted, q))
         joint = int((error / self._tube).argmax())
-        if error[joint] <= _USED_SHARE * self._tube[joint]:
+        if error[joint] <= USED_SHARE * self._tube[joint]:
             return "", False
         told = f"{error[joint]:.3g} rad or m in {self._arm.joint_names[joint]}"
         is_astray = not bool(error.max() <= max(_LOST, self._tube.max()))

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from densarm.arms.arm import Arm
+from densarm.arms.dynamics import mass_entry
 from densarm.values.arrays import Array
 from densarm.values.checks import non_negative
 from densarm.values.cholesky import factorise, solve_factorised
@@ -214,7 +215,7 @@ def observe(  # noqa: C901  # one kernel, since every call has its cost
     for i in range(nv):
         momentum = 0.0
         for j in range(nv):
-            momentum += (mass[i, j] if i <= j else mass[j, i]) * innovation[j]
+            momentum += mass_entry(mass, i, j) * innovation[j]
         most, found = rows[_LARGEST, i], disturbance[i] + momentum
         disturbance[i] = most if found > most else -most if found < -most else found
         rows[AHEAD_ANGLE, i], rows[AHEAD_VELOCITY, i] = angle[i], velocity[i]

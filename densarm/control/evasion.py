@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from densarm.arms.dynamics import mass_entry
 from densarm.control.disturbance_observer import AHEAD_VELOCITY, DISTURBANCE, FREE
 from densarm.control.inverse_dynamics import (
     EFFORT_LIMIT,
@@ -170,7 +171,7 @@ class Evasion:
         """
         angles, found = self._arm.angles(q), np.empty(self._arm.nv)
         self._write_rows(v, angles)
-        self._pairs.set_reach(self._pairs.reach)  # which kernels have written to
+        self._pairs.look_again()  # since reach was written to
         gives_way = self._nearest(
             angles, v, nominal, self._limits, self._rows, self._count, self._chosen, found
         )
@@ -280,7 +281,7 @@ def _send(arrays: DynamicsArrays, wanted: Array, ahead: Array, most: Array) -> N
     for i in range(n):
         tau, length = offset[i], 0.0
         for j in range(n):
-            table[i, j] = most[j] * (mass[i, j] if i <= j else mass[j, i])
+            table[i, j] = most[j] * mass_entry(mass, i, j)
             tau += table[i, j] * a[j]
             length += table[i, j] * table[i, j]
         holds &= low[i] <= tau <= high[i]
@@ -295,7 +296,7 @@ def _send(arrays: DynamicsArrays, wanted: Array, ahead: Array, most: Array) -> N
         for i in range(n):
             tau = offset[i]
             for j in range(n):
-                tau += most[j] * (mass[i, j] if i <= j else mass[j, i]) * found[j]
+                tau += most[j] * mass_entry(mass, i, j) * found[j]
             rows[TORQUE, i] = min(max(tau, low[i]), high[i])
     for i in range(n):
         sent[-1, i] = rows[TORQUE, i]

@@ -7,7 +7,7 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from densarm.arms.arm import Arm
-from densarm.arms.dynamics import Kinematics
+from densarm.arms.dynamics import Kinematics, mass_entry
 from densarm.control.disturbance_observer import (
     AHEAD_ANGLE,
     AHEAD_VELOCITY,
@@ -225,7 +225,7 @@ def _limited_torque(arrays: DynamicsArrays) -> None:
     for i in range(nonlinear.shape[0]):
         brake, attract = 0.0, 0.0
         for j in range(nonlinear.shape[0]):
-            entry = mass[i, j] if i <= j else mass[j, i]  # crba fills the upper triangle
+            entry = mass_entry(mass, i, j)
             brake += entry * gamma * rows[BRAKE, j]
             attract += entry * beta * rows[ATTRACT, j]
         rows[_BRAKE_TORQUE, i] = brake
@@ -298,7 +298,7 @@ def robust_torque(gain: float, elapsed: float, late: float, arrays: DynamicsArra
     for i in range(n):
         tau = nonlinear[i] - rows[DISTURBANCE, i] + rows[_BRAKE_TORQUE, i]
         for j in range(n):
-            entry = mass[i, j] if i <= j else mass[j, i]
+            entry = mass_entry(mass, i, j)
             tau += entry * (rows[BRAKE, j] + feedback[j])
         rows[TORQUE, i] = _clipped(tau, rows[EFFORT_LIMIT, i])
 

@@ -7,11 +7,11 @@ from numpy.typing import ArrayLike
 
 from densarm.arms.arm import Arm
 from densarm.control.controller import ToldByGoal, checked_state
+from densarm.control.course import USED_SHARE
 from densarm.planning.motion import Motion
 from densarm.values.arrays import Array
 from densarm.values.checks import positive
 
-_USED_SHARE = 0.9  # of a motion's tube, which the arm may use
 _LONGEST_STEP = 2.0  # periods that the motion goes on by at once, however late a call is
 _CLOCK_RATE = 20.0  # ω [1/s]
 _LIMIT_SHARE = 0.95  # of acceleration limits, that pausing and going on take with the motion
@@ -94,7 +94,7 @@ class PositionTracking(ToldByGoal):
         nearest = int((off / self._bound).max(axis=1).argmin())
         self.reference, self.tracking_error = told[nearest], float(off[nearest].max())
         joint = int((off[nearest] / self._bound).argmax())
-        if off[nearest, joint] > _USED_SHARE * self._bound[joint] and self._wanted > 0.0:
+        if off[nearest, joint] > USED_SHARE * self._bound[joint] and self._wanted > 0.0:
             name = self._arm.joint_names[joint]
             self.pause(
                 f"paused at t = {t:.3f} s: {name} was {off[nearest, joint]:.3g} rad or m off the "

@@ -279,9 +279,7 @@ class _Loop:
             columns = np.transpose(np.array(rows))
             return np.transpose([np.interp(steps, at, column) for column in columns])
 
-        q = np.array(self._q)
-        turned = np.cumsum(arm.difference(q[:-1], q[1:]), axis=0)
-        angles = arm.angles(q[:1]) + np.vstack([np.zeros((1, arm.nv)), turned])
+        angles = arm.unwrapped(np.array(self._q))
         missing = len(steps) - len(at)
         remarks = [str(getattr(self.law, "remark", ""))]
         if missing:

@@ -9,7 +9,7 @@ import pinocchio as pin
 from densarm.arms.arm import Arm
 from densarm.certificates.task import Input
 from densarm.errors import InvalidValueError, RobotError
-from densarm.hardware.robot import Reading, driver
+from densarm.hardware.robot import Reading, driver, in_its_words
 from densarm.values.arrays import Array
 
 _JOINTS = 7
@@ -66,7 +66,7 @@ class FrankaRobot:
             )
             self.state = self._robot.read_once()
         except self._failures as error:
-            raise self._error("cannot be reached", error) from None
+            raise in_its_words(self._address, "cannot be reached", error) from None
         self.require_ready()
 
     def require_ready(self) -> None:
@@ -93,7 +93,7 @@ class FrankaRobot:
             self._robot.automatic_error_recovery()
             self.state = self._robot.read_once()
         except self._failures as error:
-            raise self._error("does not recover", error) from None
+            raise in_its_words(self._address, "does not recover", error) from None
         self.require_ready()
 
     def read(self) -> Reading:
@@ -105,7 +105,7 @@ class FrankaRobot:
                 self.state, _ = self._control.readOnce()
         except self._failures as error:
             self._control = None
-            raise self._error("stopped", error) from None
+            raise in_its_words(self._address, "stopped", error) from None
         state = self.state
         return Reading(state.time.to_sec(), np.array(state.q), np.array(state.dq))
 
@@ -124,7 +124,7 @@ class FrankaRobot:
             self._control.writeOnce(self._franka.Torques(free.tolist()))
         except self._failures as error:
             self._control = None
-            raise self._error("stopped", error) from None
+            raise in_its_words(self._address, "stopped", error) from None
 
     def stop(self) -> None:
         """Act as `Robot.stop`: the robot goes on holding itself."""
@@ -140,7 +140,3 @@ class FrankaRobot:
                 return
         with contextlib.suppress(*self._failures):
             self._robot.stop()
-
-    def _error(self, what: str, error: Exception) -> RobotError:
-        words = " ".join(str(error).split())
-        return RobotError(f"the robot at {self._address} {what}: {words}")

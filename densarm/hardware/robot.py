@@ -4,7 +4,7 @@ from importlib import import_module
 from typing import Any, NamedTuple, Protocol
 
 from densarm.certificates.task import Input
-from densarm.errors import DensarmError
+from densarm.errors import DensarmError, RobotError
 from densarm.values.arrays import Array
 
 
@@ -66,3 +66,8 @@ def driver(module: str, extra: str) -> Any:
     except ImportError as error:
         message = f"{module} cannot be imported ({error}): pip install 'densarm[{extra}]'"
         raise DensarmError(" ".join(message.split())) from None
+
+
+def in_its_words(address: str, what: str, error: Exception) -> RobotError:
+    """Return what a robot's package says of the robot at an address, as an error of one line."""
+    return RobotError(f"the robot at {address} {what}: {' '.join(str(error).split())}")

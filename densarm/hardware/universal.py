@@ -7,7 +7,7 @@ import numpy as np
 
 from densarm.certificates.task import Input
 from densarm.errors import RobotError
-from densarm.hardware.robot import Reading, driver
+from densarm.hardware.robot import Reading, driver, in_its_words
 from densarm.values.arrays import Array
 from densarm.values.checks import positive
 
@@ -53,7 +53,7 @@ class UniversalRobot:
             self._require_ready()
             self._control = control.RTDEControlInterface(address, frequency)
         except RuntimeError as error:
-            raise self._error("cannot be reached", error) from None
+            raise in_its_words(self._address, "cannot be reached", error) from None
 
     def _require_ready(self) -> None:
         receive = self._receive
@@ -81,7 +81,7 @@ class UniversalRobot:
         try:
             taken = self._control.servoJ(wanted, 0.0, 0.0, self.period, self._lookahead, self._gain)
         except RuntimeError as error:
-            raise self._error("stopped", error) from None
+            raise in_its_words(self._address, "stopped", error) from None
         if not taken:
             raise RobotError(f"the robot at {self._address} took no position: its script stopped")
 
@@ -91,7 +91,3 @@ class UniversalRobot:
             with contextlib.suppress(RuntimeError):
                 self._control.servoStop()
         self._is_driven = False
-
-    def _error(self, what: str, error: Exception) -> RobotError:
-        words = " ".join(str(error).split())
-        return RobotError(f"the robot at {self._address} {what}: {words}")

@@ -84,7 +84,7 @@ def smooth_path(
 
     Source: convex hull property: de Boor, A Practical Guide to Splines, ch. IX.
     """
-    corner, length = _polyline(world.arm, curve)
+    corner, length = polyline(world.arm, curve)
     proof = _MotionProof(world, margin, kept)
     for halving in range(_HALVINGS):
         count = max(_DEGREE + 1, 1 + int(np.ceil(length[-1] * 2.0**halving / _WIDEST)))
@@ -115,7 +115,7 @@ def blended_path(
 
     Source: I. J. Schoenberg, On Spline Functions, 1967, for the control points.
     """
-    corner, length = _polyline(world.arm, curve)
+    corner, length = polyline(world.arm, curve)
     proof = _MotionProof(world, margin, kept)
     breaks = np.linspace(0.0, length[-1], 1 + max(1, int(np.ceil(length[-1] / widest))))
     for _ in range(_HALVINGS + 1):
@@ -136,7 +136,7 @@ def blended_path(
     return None
 
 
-def _polyline(arm: Arm, curve: Array) -> tuple[Array, Array]:
+def polyline(arm: Arm, curve: Array) -> tuple[Array, Array]:
     """Return joint positions (N, nv) at the corners of a polyline, and lengths to them (N,)."""
     steps = arm.difference(curve[:-1], curve[1:])
     corner = arm.angles(curve[0]) + np.vstack([np.zeros(arm.nv), np.cumsum(steps, axis=0)])

@@ -3,6 +3,7 @@
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from densarm.values.arrays import Array
 from densarm.values.kernels import compiled_beside, compiled_part
@@ -21,6 +22,39 @@ class PointTree(NamedTuple):
     """The points (N, 3) [m]."""
     boxes: Array
     """Least and largest coordinates of the points of each node (M, 6) [m]."""
+
+
+DEEPEST = 64
+"""Nodes that wait at most in a search, of a tree of up to 2^60 points."""
+
+
+@compiled_part
+def put_nearer_last(
+    first: int,
+    first_bound: float,
+    second: int,
+    second_bound: float,
+    waiting: NDArray[np.int64],
+    bounds: Array,
+    count: int,
+) -> int:
+    """Let two nodes wait, at given distances; return how many wait.
+
+    The nearer, or of equals the first, is put last: the one to be looked at next.
+    """
+    if second_bound < first_bound:
+        first, second, first_bound, second_bound = second, first, second_bound, first_bound
+    waiting[count], waiting[count + 1] = second, first
+    bounds[count], bounds[count + 1] = second_bound, first_bound
+    return count + 2
+
+
+@compiled_part
+def leaf_points(tree: PointTree, node: int) -> tuple[int, int]:
+    """Return the first point of a node and that after the last; none of a node that is no leaf."""
+    n, n_leaves = tree.points.shape[0], (tree.boxes.shape[0] + 1) // 2
+    leaf = node - n_leaves + 1
+    return ((leaf * n) // n_leaves, ((leaf + 1) * n) // n_leaves) if leaf >= 0 else (0, 0)
 
 
 def point_tree(points: Array) -> PointTree:

@@ -383,16 +383,14 @@ def shortest_time(run: Run) -> float | None:
     # SciPy and TOPP-RA take a second to import.
     from scipy.interpolate import make_interp_spline
 
-    from densarm.planning.smoothing import SmoothPath
+    from densarm.planning.smoothing import SmoothPath, polyline
     from densarm.planning.timing import time_path
 
     arm = run.task.arm
-    steps = arm.difference(run.q[:-1], run.q[1:])
-    arc = np.append(0.0, np.cumsum(np.linalg.norm(steps, axis=1)))
+    angles, arc = polyline(arm, run.q)
     length = float(arc[-1])
     if length < _SPACING:
         return None
-    angles = arm.angles(run.q[0]) + np.vstack([np.zeros(arm.nv), np.cumsum(steps, axis=0)])
     at = np.linspace(0.0, length, max(_DEGREE, round(length / _SPACING)) + 1)
     points = np.column_stack([np.interp(at, arc, column) for column in angles.T])
     spline = make_interp_spline(at / length, points, k=_DEGREE)

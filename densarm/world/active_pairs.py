@@ -114,7 +114,7 @@ class ActivePairs:
         # least level - lipschitz @ s - w. Third row: w at the last update.
         self._pair_numbers = np.zeros((3, world.n_pairs))
         self.reach: Array = self._pair_numbers[0]
-        """Distance up to which each pair is awake (K,) [m], to be changed by `set_reach`."""
+        """Distance up to which each pair is awake (K,) [m]; after writing to it, `look_again`."""
         self.listed: NDArray[np.int64] = self._pair_states[3]
         """The pairs that were awake at the last update, in their order; as many as `n_awake`."""
         self.n_awake = 0
@@ -164,19 +164,23 @@ class ActivePairs:
     def set_reach(self, reach: float | Array) -> None:
         """Let pairs be awake up to other distances from now on, one for all or (K,) [m]."""
         self.reach[:] = reach
+        self.look_again()
+
+    def look_again(self) -> None:
+        """Look at every pair at the next update, as after reach was written to."""
         self._blocks[:, 0] = -np.inf
 
     def wake_all(self) -> None:
         """Query every pair at the next update."""
         self._pair_states[1] = _NEVER
-        self._blocks[:, 0] = -np.inf
+        self.look_again()
 
     def update(self, q: Array) -> None:
         """Query the pairs that may be within reach at q (nq,), and some others."""
         data = self._geometry_data
         if self._version != self.world.version:
             self._version = self.world.version
-            self._blocks[:, 0] = -np.inf
+            self.look_again()
         n_awake, n_changed = self._wake(np.asarray(q, np.float64), *self._arrays)
         self.n_awake = n_awake
         self._bounds = None

@@ -154,6 +154,13 @@ def _cloud_trees(world: World) -> tuple[Integers, list[PointTree]]:
     return cloud, trees
 
 
+@compiled_part
+def tree_of(clouds: Clouds, c: int) -> PointTree:
+    """Return one of the trees."""
+    points = clouds.points[clouds.first[c, 0] : clouds.first[c + 1, 0]]
+    return PointTree(points, clouds.boxes[clouds.first[c, 1] : clouds.first[c + 1, 1]])
+
+
 def _joined(trees: list[PointTree]) -> Clouds:
     points, boxes = [np.zeros((0, 3))], [np.zeros((0, 6))]
     for tree in trees:

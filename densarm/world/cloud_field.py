@@ -7,10 +7,10 @@ from weakref import WeakKeyDictionary
 import numpy as np
 from numpy.typing import NDArray
 
+from densarm.scene.point_tree import DEEPEST, leaf_points, put_nearer_last
 from densarm.values.arrays import Array
 from densarm.values.kernels import compiled_part
-from densarm.world.bodies import Bodies, bodies_of
-from densarm.world.cloud_search import DEEPEST
+from densarm.world.bodies import Bodies, bodies_of, tree_of
 from densarm.world.simplex import Integers
 from densarm.world.world import World
 
@@ -130,9 +130,8 @@ def _distance(bodies: Bodies, fields: Fields, c: int, level: int, most: float, x
 @compiled_part
 def _from_points(bodies: Bodies, c: int, most: float, x: Array) -> float:
     """Return the distance of a place from the nearest point of a cloud, which is at most so far."""
-    points = bodies.clouds.points[bodies.clouds.first[c, 0] : bodies.clouds.first[c + 1, 0]]
-    boxes = bodies.clouds.boxes[bodies.clouds.first[c, 1] : bodies.clouds.first[c + 1, 1]]
-    n, n_leaves = points.shape[0], (boxes.shape[0] + 1) // 2
+    tree = tree_of(bodies.clouds, c)
+    points, boxes = tree
     waiting, bounds = np.zeros(DEEPEST, np.int64), np.zeros(DEEPEST)
     count, least = 1, most * most
     while count > 0:
@@ -140,17 +139,12 @@ def _from_points(bodies: Bodies, c: int, most: float, x: Array) -> float:
         node = waiting[count]
         if bounds[count] >= least:
             continue
-        if node < n_leaves - 1:
-            first, second = 2 * node + 1, 2 * node + 2
-            near, other = _square(boxes[first], x), _square(boxes[second], x)
-            if near < other:
-                first, second, near, other = second, first, other, near
-            waiting[count], waiting[count + 1] = first, second
-            bounds[count], bounds[count + 1] = near, other
-            count += 2
-            continue
-        leaf = node - n_leaves + 1
-        for k in range((leaf * n) // n_leaves, ((leaf + 1) * n) // n_leaves):
+        begin, end = leaf_points(tree, node)
+        if begin == end:
+            one, other = 2 * node + 2, 2 * node + 1
+            near, far = _square(boxes[one], x), _square(boxes[other], x)
+            count = put_nearer_last(one, near, other, far, waiting, bounds, count)
+        for k in range(begin, end):
             square = 0.0
             for axis in range(3):
                 square += (points[k, axis] - x[axis]) ** 2

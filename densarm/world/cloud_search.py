@@ -4,14 +4,11 @@ import math
 
 import numpy as np
 
-from densarm.scene.point_tree import PointTree
+from densarm.scene.point_tree import DEEPEST, PointTree, leaf_points, put_nearer_last
 from densarm.values.arrays import Array
 from densarm.values.kernels import compiled, compiled_part
 from densarm.world.hulls import Hulls, Search, new_search, point_depth, point_gap
 from densarm.world.simplex import Integers
-
-DEEPEST = 64
-"""Nodes that wait at most, of a tree of up to 2^60 points."""
 
 SHARE = 0.1
 """Of a node's size, by which the plane between it and a hull may fall short of their distance."""
@@ -100,7 +97,6 @@ def nearest_point(  # noqa: C901  # what is called at each level is compiled onc
         search: space to work in.
     """
     points, boxes = tree
-    n, n_leaves = points.shape[0], (boxes.shape[0] + 1) // 2
     waiting, bounds = np.empty(DEEPEST, np.int64), np.empty(DEEPEST)
     x, middle, plane, box = np.empty(3), np.empty(3), np.zeros(4), hulls.boxes[body]
     best, nearest, count = math.inf, 0, 1
@@ -123,17 +119,12 @@ def nearest_point(  # noqa: C901  # what is called at each level is compiled onc
                 plane[i] = search.plane[i]
             if plane_bound(boxes[node], seen, plane) >= best:
                 continue
-        if node < n_leaves - 1:
-            # The child that is pushed last is looked at first.
-            near = box_bound(boxes[2 * node + 1], seen, box)
-            far = box_bound(boxes[2 * node + 2], seen, box)
-            first = 2 * node + (1 if far < near else 2)
-            waiting[count], bounds[count] = first, max(near, far)
-            waiting[count + 1], bounds[count + 1] = 4 * node + 3 - first, min(near, far)
-            count += 2
-            continue
-        leaf = node - n_leaves + 1
-        for k in range((leaf * n) // n_leaves, ((leaf + 1) * n) // n_leaves):
+        begin, end = leaf_points(tree, node)
+        if begin == end:
+            one, other = 2 * node + 1, 2 * node + 2
+            near, far = box_bound(boxes[one], seen, box), box_bound(boxes[other], seen, box)
+            count = put_nearer_last(one, near, other, far, waiting, bounds, count)
+        for k in range(begin, end):
             see(seen, points[k], x)
             if plane[0] * x[0] + plane[1] * x[1] + plane[2] * x[2] - plane[3] >= best:
                 continue

@@ -4,12 +4,12 @@ import math
 
 import numpy as np
 
+from densarm.scene.point_tree import DEEPEST, leaf_points, put_nearer_last
 from densarm.values.arrays import Array
 from densarm.values.kernels import compiled_part
-from densarm.world.bodies import BOX, RADIUS, Bodies
+from densarm.world.bodies import BOX, RADIUS, Bodies, tree_of
 from densarm.world.cloud_field import Arc
 from densarm.world.cloud_search import (
-    DEEPEST,
     SHARE,
     box_bound,
     plane_bound,
@@ -42,10 +42,9 @@ def unproved_halves(  # noqa: C901  # what is called at each level is compiled o
     Returns:
         -1 where a point is not apart in the middle.
     """
-    c, corner, unproved = bodies.cloud[arc.cloud], start, 0
-    points = bodies.clouds.points[bodies.clouds.first[c, 0] : bodies.clouds.first[c + 1, 0]]
-    boxes = bodies.clouds.boxes[bodies.clouds.first[c, 1] : bodies.clouds.first[c + 1, 1]]
-    n, n_leaves, held = points.shape[0], (boxes.shape[0] + 1) // 2, arc.held
+    tree = tree_of(bodies.clouds, bodies.cloud[arc.cloud])
+    held, corner, unproved = arc.held, start, 0
+    points, boxes = tree
     search, seen, box = new_search(), np.empty(12), np.empty(6)
     planes, x, middle = np.zeros((_PLANES, 6)), np.empty(3), np.empty(3)
     planes[:, 3] = math.inf  # which prove nothing
@@ -63,7 +62,8 @@ def unproved_halves(  # noqa: C901  # what is called at each level is compiled o
         if far - held > arc.half or _proves(boxes[node], seen, held, planes):
             continue
         size = write_middle(boxes[node], middle)
-        if far > 0.0 or node >= n_leaves - 1:
+        begin, end = leaf_points(tree, node)
+        if far > 0.0 or begin < end:
             see(seen, middle, x)
             enough, accuracy = held + arc.half + size, SHARE * size + _ACCURACY
             gap, _ = point_gap(bodies.points, bodies.edges, corner, x, enough, accuracy, search)
@@ -72,19 +72,11 @@ def unproved_halves(  # noqa: C901  # what is called at each level is compiled o
                 _write_plane(bodies, poses, arc, corner, search.plane, planes[_PLANES - 1])
                 if _proves(boxes[node], seen, held, planes[_PLANES - 1 :]):
                     continue
-        if node < n_leaves - 1:
-            # The child that is pushed last is looked at first.
-            first, second = 2 * node + 1, 2 * node + 2
-            near = box_bound(boxes[first], seen, box)
-            other = box_bound(boxes[second], seen, box)
-            if near < other:
-                first, second, near, other = second, first, other, near
-            waiting[count], waiting[count + 1] = first, second
-            bounds[count], bounds[count + 1] = near, other
-            count += 2
-            continue
-        leaf = node - n_leaves + 1
-        for k in range((leaf * n) // n_leaves, ((leaf + 1) * n) // n_leaves):
+        if begin == end:
+            one, other = 2 * node + 2, 2 * node + 1
+            near, far = box_bound(boxes[one], seen, box), box_bound(boxes[other], seen, box)
+            count = put_nearer_last(one, near, other, far, waiting, bounds, count)
+        for k in range(begin, end):
             see(seen, points[k], x)
             if _is_beyond(x, held, planes):
                 continue

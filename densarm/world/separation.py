@@ -5,6 +5,7 @@ import math
 from densarm.values.arrays import Array
 from densarm.values.kernels import compiled_part
 from densarm.world.bodies import Bodies
+from densarm.world.hulls import farthest_corner
 from densarm.world.simplex import Integers, approach_origin
 
 ACCURACY = 0.01
@@ -114,16 +115,7 @@ def climb(
             b += pose[hull, 3 * k + 1] * x
             c += pose[hull, 3 * k + 2] * x
             at += pose[hull, 9 + k] * x
-        best = points[corner, 0] * a + points[corner, 1] * b + points[corner, 2] * c
-        climbing = True
-        while climbing:
-            climbing = False
-            for k in range(edges[corner], edges[corner + 1]):
-                near = edges[k]
-                value = points[near, 0] * a + points[near, 1] * b + points[near, 2] * c
-                if value > best:
-                    best, corner, climbing = value, near, True
-        end[side] = corner
+        end[side], best = farthest_corner(points, edges, corner, a, b, c)
         beyond -= best + at
     return beyond
 

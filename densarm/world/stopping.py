@@ -173,8 +173,7 @@ class StoppingCheck:
         end = arm.angles(q) + travel
         outside = limits.excess(end).max(axis=1)
         inside = np.asarray(outside <= _ROUNDING)
-        turns = np.cumsum(arm.difference(q[:-1], q[1:]), axis=0)
-        angles = arm.angles(q[0]) + np.vstack([np.zeros(arm.nv), turns])
+        angles = arm.unwrapped(q)
         if time is None:
             clear = self.are_clear(angles, travel)
         else:

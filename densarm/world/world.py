@@ -310,25 +310,22 @@ def base_overlaps(arm: Arm, scene: Scene) -> tuple[str, ...]:
     """
     still = [item for item in arm.collision_model.geometryObjects if not item.parentJoint]
     found = []
-    for body, obstacle in product(still, scene):
-        for other in geometry_objects(obstacle, origin=arm.origin):
-            if isinstance(obstacle, PointCloud):
-                other.placement = nearest_ball(obstacle, other.placement, body)
-            depth = -_distance(body, other)
-            if depth > _OVERLAP:
-                names = f"{body.name!r} is in {other.name!r}"
-                found.append(f"{names} by {1e3 * depth:.3g} mm")
+    around = [(item, x) for item in scene for x in geometry_objects(item, origin=arm.origin)]
+    for body, (obstacle, other) in product(still, around):
+        is_cloud = isinstance(obstacle, PointCloud)
+        pose = nearest_ball(obstacle, other.placement, body) if is_cloud else other.placement
+        depth = -_distance(body, other.geometry, pose)
+        if depth > _OVERLAP:
+            found.append(f"{body.name!r} is in {other.name!r} by {1e3 * depth:.3g} mm")
     return tuple(found)
 
 
-def _distance(first: pin.GeometryObject, second: pin.GeometryObject) -> float:
-    """Return the signed distance of two shapes that no joint moves [m]."""
-    one, other = (
-        coal.Transform3s(x.placement.rotation, x.placement.translation) for x in (first, second)
-    )
+def _distance(body: pin.GeometryObject, shape: coal.CollisionGeometry, pose: pin.SE3) -> float:
+    """Return the signed distance of a body that no joint moves from a shape at a pose [m]."""
+    one, other = (coal.Transform3s(x.rotation, x.translation) for x in (body.placement, pose))
     # At coal's own tolerance of 1e-6 m: at tighter ones it may find no distance.
     request, result = coal.DistanceRequest(), coal.DistanceResult()
-    return float(coal.distance(first.geometry, one, second.geometry, other, request, result))
+    return float(coal.distance(body.geometry, one, shape, other, request, result))
 
 
 def _geometry_model(arm: Arm, scene: Scene) -> tuple[pin.GeometryModel, list[int]]:
