@@ -41,9 +41,10 @@ PATIENCE = 60.0  # [s] for a page that draws without a graphics card on a busy m
 FLAGS = (
     "--headless",
     "--no-sandbox",
-    "--use-gl=swiftshader",
+    # A driver by a name that it does not know would be tried twice, and lose a page's context.
+    "--use-gl=angle",
+    "--use-angle=swiftshader",
     "--enable-unsafe-swiftshader",
-    "--disable-gpu-watchdog",  # a busy machine takes its time, and would lose the page's context
     "--disable-background-networking",
     "--disable-component-update",
     "--disable-sync",
