@@ -23,7 +23,7 @@ from densarm.values.checks import non_negative, positive
 from densarm.values.documented import documented
 from densarm.values.kernels import compiled, entry_point
 from densarm.world.active_pairs import ActivePairs, pair_motion
-from densarm.world.distance_view import pair_rate
+from densarm.world.distance_view import obstacle_speed, pair_rate
 from densarm.world.stopping import HELD_SHARE
 from densarm.world.world import World
 
@@ -41,6 +41,7 @@ _WEIGHT = 1e4  # of a row's lack
 _FIRMNESS = 30.0  # of rows of what stands, as if they lacked so many times as much
 _LEAST_SHARE = 1e-5  # of σ, of h where the bump is evaluated
 _LEAST_LEVER = 1e-9  # [m], of a row that some joint can do something about
+_CLOSING = np.arange(0.0, 20.0, 0.05)  # [m/s], for which it is known how near a row asks for more
 
 # Of pairs: whether awake, distances, Jacobian, sign, Lipschitz constants, twists, whether they
 # move, and reach.
@@ -102,7 +103,7 @@ class Evasion:
 
     Args:
         world: the pairs; obstacles count as moving that have a motion, or were moved since now.
-        pairs: updated by their owner, whose reach is widened while something moves.
+        pairs: updated by their owner, awake as far as their rows may matter while something moves.
         margin: to keep from everything [m].
         parameters: distances and times.
 
@@ -121,7 +122,6 @@ class Evasion:
         self._world, self._arm, self._pairs, self.parameters = world, arm, pairs, p
         self._version, self._way_before = -1, world.obstacle_way.copy()
         self._is_moving, self._is_needed = np.zeros(world.n_pairs, bool), False
-        self._ahead = np.array([margin + p.margin + p.distance, p.reaction + p.horizon])
         n, size = arm.nv, (_TIMES + 2) * world.n_pairs
         # Blocks of rows of what moves, of misses at each time, and of what stands; how many in
         # each; all in reach.
@@ -137,19 +137,21 @@ class Evasion:
         self._reaches = np.full((2, world.n_pairs), np.nan)
         slopes = pairs.kinematics.jacobian, world.sign, world.lipschitz
         self._now = pairs.state, pairs.rows, *slopes, world.twist, is_moving, pairs.reach
-        self._density = np.array([margin, p.distance, p.decay, p.margin, p.reaction])
+        numbers = np.array([margin, p.distance, p.decay, p.margin, p.reaction])
+        self._density = numbers, _farthest(p.distance, p.decay)
         self._most, self._none = HELD_SHARE * limits.acceleration, np.zeros(n)
         # Kernels are loaded, or compiled, before a control loop.
         rows = self._now, self._density, self._none, self._limits, self._reaches, self._rows
         self._density_rows = entry_point(_density_rows, *rows)
         box = self._limits, self._rows, self._count, self._chosen
         self._nearest = entry_point(_nearest, *(self._none,) * 3, *box, self._none)
-        moves = self._is_moving, world.has_motion, world.obstacle_way, self._way_before
-        self._moves = *moves, world.twist, self._ahead, pairs.reach
+        self._moves = self._is_moving, world.has_motion, world.obstacle_way, self._way_before
         self._note_moving = entry_point(_note_moving, *self._moves)
+        arrays = InverseDynamics(arm, limits.acceleration).arrays
+        self._send = entry_point(_send, arrays, self._none, self._none, self._most)
 
     def is_needed(self) -> bool:
-        """Return whether any obstacle moves, or was moved; pairs are awake in time from then on."""
+        """Return whether any obstacle moves, or was moved."""
         world = self._world
         if world.version != self._version:
             self._version = world.version
@@ -186,7 +188,7 @@ class Evasion:
         torque limits and the torque rate of the dynamics allow.
         """
         ahead = self._none if ahead is None else ahead
-        _send(dynamics.arrays, wanted, ahead, self._most)
+        self._send(dynamics.arrays, wanted, ahead, self._most)
 
     def _write_rows(self, v: Array, angles: Array) -> None:
         """Write ∇h · q̇ ≥ b of all rows, [∇h, b] (nv + 1,), in blocks of the number of pairs."""
@@ -204,23 +206,22 @@ class Evasion:
 
 @compiled
 def _note_moving(
-    is_moving: NDArray[np.bool_],
-    has_motion: NDArray[np.bool_],
-    way: Array,
-    way_before: Array,
-    twist: Array,
-    ahead: Array,
-    reach: Array,
+    is_moving: NDArray[np.bool_], has_motion: NDArray[np.bool_], way: Array, way_before: Array
 ) -> bool:
-    """Note which pairs have an obstacle that moves, widen their reach, and return if any has."""
+    """Note which pairs have an obstacle that moves, and return if any has."""
     some = False
-    for k in range(reach.shape[0]):
+    for k in range(is_moving.shape[0]):
         is_moving[k] = has_motion[k] or way[k] != way_before[k]
         some |= is_moving[k]
-        if is_moving[k]:
-            speed = math.sqrt(twist[k, 0] ** 2 + twist[k, 1] ** 2 + twist[k, 2] ** 2)
-            reach[k] = max(reach[k], ahead[0] + ahead[1] * speed)
     return some
+
+
+def _farthest(width: float, decay: float) -> Array:
+    """Return up to which h [m] a row of what moves asks for more than each of `_CLOSING`."""
+    h = np.linspace(_LEAST_SHARE, 1.0, 2000, endpoint=False) * width
+    slope = np.array([log_inverse_bump(x, width, 0.0)[1] for x in h])
+    with np.errstate(divide="ignore"):  # towards σ there is none
+        return np.asarray(np.interp(_CLOSING, decay / slope, h, right=width))
 
 
 @compiled
@@ -304,14 +305,15 @@ def _send(arrays: DynamicsArrays, wanted: Array, ahead: Array, most: Array) -> N
 
 @compiled
 def _density_rows(
-    now: _Now, numbers: Array, v: Array, limits: Array, reaches: Array, table: Array
+    now: _Now, density: tuple[Array, Array], v: Array, limits: Array, reaches: Array, table: Array
 ) -> tuple[int, int]:
-    """Write rows that some velocity in reach may break, and how far what stands is to be awake.
+    """Write rows that some velocity in reach may break, and how far pairs are to be awake for them.
 
     `reaches` are reach as others have it, and as it was written last (2, K) [m]. How many rows of
     what moves and of what stands there are is returned; the latter are the last block.
     """
     state, rows, jacobian, sign, lipschitz, twist, is_moving, reach = now
+    numbers, farthest = density
     margin, width, decay, extra, reaction = numbers
     count, standing, n = 0, table.shape[0] - state.shape[0], v.size
     fastest, soonest = np.empty(n), 0.0
@@ -320,13 +322,18 @@ def _density_rows(
         soonest = max(soonest, fastest[j] / (2.0 * _BRAKE_SHARE * limits[3, j]))
     for k in range(state.shape[0]):
         closing, h = pair_motion(lipschitz, k, fastest), rows[k, 0] - margin
+        if is_moving[k]:
+            speed = obstacle_speed(twist[k])
+            index = min((closing + speed) / _CLOSING[1] + 1.0, farthest.size - 1.0)
+            far = extra + reaction * speed + farthest[int(index)]
+        else:
+            far = min((reaction + max(1.0 / _STANDING_RATE, soonest)) * closing, width)
+        if reach[k] != reaches[1, k]:
+            reaches[0, k] = reach[k]
+        reach[k] = reaches[1, k] = max(reaches[0, k], margin + far)
+        if state[k] == 0 or h >= far:
+            continue
         if not is_moving[k]:
-            far = (reaction + max(1.0 / _STANDING_RATE, soonest)) * closing
-            if reach[k] != reaches[1, k]:
-                reaches[0, k] = reach[k]
-            reach[k] = reaches[1, k] = max(reaches[0, k], margin + min(far, width))
-            if state[k] == 0 or h >= far or h >= width:
-                continue
             row, brake = table[standing], 0.0
             speed = write_slope(rows[k], jacobian, sign[k], v, row)
             for j in range(n):
@@ -334,7 +341,7 @@ def _density_rows(
             left = max(h - reaction * max(-speed, 0.0), 0.0)
             row[n] = -min(_STANDING_RATE * left, math.sqrt(2.0 * _BRAKE_SHARE * brake * left))
             standing += 1
-        elif state[k] != 0:
+        else:
             rate = pair_rate(rows[k], twist[k])
             h -= extra + reaction * max(-rate, 0.0)
             if h >= width:

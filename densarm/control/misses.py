@@ -9,8 +9,13 @@ from numpy.typing import NDArray
 from densarm.arms.dynamics import by_columns
 from densarm.values.arrays import Array
 from densarm.values.kernels import compiled, compiled_part, entry_point
-from densarm.world.active_pairs import ActivePairs, pair_motion
-from densarm.world.distance_view import add_pair_gradient, shape_positions
+from densarm.world.active_pairs import ActivePairs, least_distance, pair_motion
+from densarm.world.distance_view import (
+    add_pair_gradient,
+    obstacle_speed,
+    shape_positions,
+    shape_rotations,
+)
 from densarm.world.pair_queries import PairQueries
 from densarm.world.world import World
 
@@ -18,8 +23,11 @@ _LAG = 0.04  # [s] until a velocity that is asked for is reached
 _SOONEST = 0.03  # [s] in which a miss is made good
 _REACH = 0.12  # [m] beyond which a miss is no row
 
-# Of pairs: whether awake, distances, whether they move, Lipschitz constants, twists and changes.
-_Now = tuple[NDArray[np.int64], Array, NDArray[np.bool_], Array, Array, NDArray[np.int64]]
+# Of pairs: whether awake, distances, of those asleep ways and numbers for bounds, whether they
+# move, Lipschitz constants, twists and changes.
+_Now = tuple[
+    NDArray[np.int64], Array, Array, Array, NDArray[np.bool_], Array, Array, NDArray[np.int64]
+]
 
 
 class MissesAhead:
@@ -27,9 +35,9 @@ class MissesAhead:
 
     .. math:: \hat h_k + (\tau - \tau_0) \nabla \hat h_k \cdot (\dot q - v) \ge 0
 
-    ĥ_k and its gradient are those at the time t + τ. Asked for are pairs awake which may be within
-    reach then by their Lipschitz constants, and then by balls around their bodies: those whose
-    obstacle moves, and, if there are any, those of what stands, lest the arm step aside into it.
+    ĥ_k and its gradient are those at the time t + τ. Asked for are pairs which may be within reach
+    then by their Lipschitz constants, and then by balls around their bodies: those whose obstacle
+    moves, and, if there are any, those awake of what stands, lest the arm step aside into it.
 
     Args:
         world: the pairs.
@@ -53,22 +61,25 @@ class MissesAhead:
         self._world, self._limits = world, limits
         self._margins, self._reach = np.array([margin, miss]), miss + _REACH
         self._queries = PairQueries(arm.model, world, remembers=False)
-        self._places, self._came = shape_positions(self._queries.data), -1
+        data = self._queries.data
+        self._places, self._turns, self._came = shape_positions(data), shape_rotations(data), -1
         self._data = arm.model.createData()
         self._jacobian = by_columns(self._data.J, (6, arm.nv))
-        # Shapes of obstacles, and a pair of each; radii of balls about the frames of all shapes.
+        # Shapes of obstacles, and a pair of each; balls about all shapes, [middle, radius] in their
+        # frames; middles at a time ahead.
         self._bodies = np.array(np.unique(world.pair_shapes[:, 1], return_index=True)).T
-        self._radius, self._there = np.zeros(geometry.ngeoms), np.zeros(arm.nv)
+        self._ball, self._middle = np.zeros((geometry.ngeoms, 4)), np.zeros((geometry.ngeoms, 3))
+        self._there = np.zeros(arm.nv)
         self._near = np.zeros(world.n_pairs, np.int64)
         moves = world.lipschitz, world.twist, world.changes
-        self._now = pairs.state, pairs.rows, is_moving, *moves
+        self._now = pairs.state, pairs.rows, pairs.way, pairs.slept, is_moving, *moves
         # Kernels are loaded, or compiled, before a control loop.
         near, there = self._near, self._there
         self._may_meet = entry_point(
             _may_meet, self._now, there, there, limits, 0.0, 0.0, near, there
         )
-        shapes = self._bodies, world.pair_shapes, self._places, self._radius
-        self._balls = is_moving, *shapes, world.twist
+        shapes = self._places, self._turns, self._ball, self._middle
+        self._balls = is_moving, self._bodies, world.pair_shapes, *shapes, world.twist
         self._meet = entry_point(_meet, near, *self._balls, 0.0, 0.0)
         self._slopes = is_moving, self._queries.rows, self._jacobian, world.sign
         rows = *self._slopes, there, self._margins, 0.0, np.zeros((1, arm.nv + 1))
@@ -108,7 +119,9 @@ class MissesAhead:
         for k, item in enumerate(self._world.geometry_model.geometryObjects):
             shape = item.geometry
             shape.computeLocalAABB()
-            self._radius[k] = shape.aabb_radius + math.hypot(*shape.aabb_center)
+            self._ball[k] = *shape.aabb_center, shape.aabb_radius
+        for slot in self._world.clouds:
+            self._ball[self._world.pair_shapes[slot.pairs, 1], 3] = slot.obstacle.reach
 
 
 @compiled
@@ -128,18 +141,20 @@ def _may_meet(
         How many, whether the obstacle of any of them turns, and the last change of the world that
         an obstacle came with.
     """
-    state, rows, is_moving, lipschitz, twist, changes = now
+    state, rows, way, slept, is_moving, lipschitz, twist, changes = now
     count, turns, some, came, fastest = 0, False, False, 0, np.abs(v)
     for k in range(state.shape[0]):
         came = max(came, changes[k])
-        if state[k] == 0:
+        if state[k] == 0 and not is_moving[k]:
             continue
-        speed = math.sqrt(twist[k, 0] ** 2 + twist[k, 1] ** 2 + twist[k, 2] ** 2)
-        if rows[k, 0] - (speed + pair_motion(lipschitz, k, fastest)) * ahead < reach:
+        speed, least = obstacle_speed(twist[k]), rows[k, 0]
+        if state[k] == 0:
+            least = least_distance(lipschitz, k, way, slept)
+        if least - (speed + pair_motion(lipschitz, k, fastest)) * ahead < reach:
             near[count] = k
             count += 1
             some |= is_moving[k]
-            turns |= twist[k, 3] != 0.0 or twist[k, 4] != 0.0 or twist[k, 5] != 0.0
+            turns |= speed == math.inf
     for j in range(v.size):
         there[j] = min(max(angles[j] + ahead * v[j], limits[0, j]), limits[1, j])
     return count if some else 0, turns, came
@@ -152,7 +167,9 @@ def _meet(
     bodies: NDArray[np.int64],
     pair_shapes: NDArray[np.int64],
     places: Array,
-    radius: Array,
+    turns: Array,
+    balls: Array,
+    middles: Array,
     twist: Array,
     ahead: float,
     reach: float,
@@ -165,12 +182,19 @@ def _meet(
         places[shape, 0] += ahead * (twist[k, 0] + (wy * z - wz * y))
         places[shape, 1] += ahead * (twist[k, 1] + (wz * x - wx * z))
         places[shape, 2] += ahead * (twist[k, 2] + (wx * y - wy * x))
+    for shape in range(balls.shape[0]):
+        for i in range(3):
+            middles[shape, i] = places[shape, i]
+            for j in range(3):
+                middles[shape, i] += turns[shape, i, j] * balls[shape, j]
     count, some = 0, False
     for k in near:
         first, second = pair_shapes[k]
-        gap = -radius[first] - radius[second]
-        gap += math.sqrt(((places[first] - places[second]) ** 2).sum())
-        if not gap > reach:  # a half-space has no middle
+        apart = reach + balls[first, 3] + balls[second, 3]
+        square = 0.0
+        for i in range(3):
+            square += (middles[first, i] - middles[second, i]) ** 2
+        if not square > apart * apart:  # a half-space has no middle
             near[count] = k
             count += 1
             some |= is_moving[k]

@@ -153,13 +153,15 @@ class DensityTracking(ToldByGoal):
         kappa = distance.kappa if isinstance(distance, TorusDistance) else math.nan
         self._numbers[_PERIOD:-2] = motion.period, actuation.delay, kappa
         self._numbers[-2:] = gains.position, gains.velocity
-        self._sample = np.zeros((6, arm.nv))
+        self._sample, rows = np.zeros((6, arm.nv)), self._dynamics.rows
         own, still = (self._numbers, self._sample, self._dynamics.arrays), np.zeros(arm.nv)
         self._arrays = self._density.log_psi_gradient, *own
         self._sample[_WEIGHTS] = getattr(distance, "weights", 1.0)
         self._sample[_MOST] = _PAUSE_SHARE * arm.limits.acceleration
         types = 0.0, self.goal, still, 0.0, motion.knots, *self._arrays
         self._kernel = entry_point(_tracking_torque, *types)
+        self._back = self._numbers, rows, self._sample, gains.rate, arm.limits.acceleration
+        self._return = entry_point(_return, *self._back, still)
         for t in (0.0, motion.period, math.nan):  # kernels are loaded before a control loop
             self.torque(t, self.goal, still)
         self.tracking_error = 0.0
@@ -183,8 +185,7 @@ class DensityTracking(ToldByGoal):
         self._act(float(t), q, v)
         if self._evasion.is_needed():
             self._evade(q)
-        tau: Array = self._dynamics.rows[TORQUE].copy()
-        return tau
+        return np.array(self._dynamics.rows[TORQUE])
 
     def _act(self, t: float, q: Array, v: Array) -> None:
         """Send the torque at a state, of which all terms and Ψ are known."""
@@ -197,16 +198,15 @@ class DensityTracking(ToldByGoal):
         It returns no faster than it can stop, and hands over where little is left to return.
         """
         numbers, rows = self._numbers, self._dynamics.rows
-        wanted, limits = np.empty(self._arm.nv), self._arm.limits
-        is_off = _return(numbers, rows, self._sample, self._gains.rate, limits.acceleration, wanted)
+        wanted = np.empty(self._arm.nv)
+        is_off = self._return(*self._back, wanted)
         is_off |= self.is_moving and abs(1.0 - numbers[RATE]) > _HANDED_OVER[1]
         wanted, gives_way = self._evasion.velocity(q, rows[AHEAD_VELOCITY], wanted)
         self._is_evading = gives_way or (self._is_evading and bool(is_off))
         if self._is_evading:
             numbers[EMERGENCY] = min(numbers[EMERGENCY], 0.0)
             rows[RATE_LIMIT] = self._dynamics.elapsed * rows[TORQUE_RATE]
-            ahead = None if gives_way else rows[BRAKE]
-            self._evasion.send_torque(self._dynamics, wanted, ahead)
+            self._evasion.send_torque(self._dynamics, wanted, None if gives_way else rows[BRAKE])
 
     @property
     def is_evading(self) -> bool:

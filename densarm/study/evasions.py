@@ -55,6 +55,7 @@ class StopAndGo(Evasion):
 
     def velocity(self, q: Array, v: Array, nominal: Array) -> tuple[Array, bool]:
         """Act as `Evasion.velocity`."""
+        self._pairs.set_reach(np.maximum(self._pairs.reach, REACH))
         moving = self._is_moving & (self._pairs.state != 0)
         near = bool((self._pairs.rows[moving, 0] < _STOP_DISTANCE).any())
         return super().velocity(q, v, 0.0 * nominal if near else nominal)[0], near

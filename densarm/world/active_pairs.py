@@ -115,6 +115,8 @@ class ActivePairs:
         self._pair_numbers = np.zeros((3, world.n_pairs))
         self.reach: Array = self._pair_numbers[0]
         """Distance up to which each pair is awake (K,) [m]; after writing to it, `look_again`."""
+        self.slept: Array = self._pair_numbers[1:]
+        """Of pairs asleep, what `least_distance` reads (2, K) [m]."""
         self.listed: NDArray[np.int64] = self._pair_states[3]
         """The pairs that were awake at the last update, in their order; as many as `n_awake`."""
         self.n_awake = 0
@@ -122,6 +124,8 @@ class ActivePairs:
         self._version = 0
         self._bounds: Array | None = None
         self._joint_numbers, rest = joint_numbers(arm), pin.neutral(arm.model)
+        self.way: Array = self._joint_numbers[0]
+        """How far each joint has gone since this was made (nv,) [rad or m]."""
         self._arrays: tuple[Any, ...] = (
             rest.copy(),
             arm.joint_index,
@@ -329,6 +333,20 @@ def go(q: Array, q_last: Array, joint_index: NDArray[np.int64], joint_numbers: A
     for i in range(q.shape[0]):
         q_last[i] = q[i]
     return holds
+
+
+@compiled_part
+def least_distance(lipschitz: Array, pair: int, way: Array, slept: Array) -> float:
+    """Return a lower bound of the distance [m] of a pair that is asleep, at the last update.
+
+    Args:
+        lipschitz: of the world (K, nv).
+        pair: its index.
+        way: `ActivePairs.way` (nv,).
+        slept: `ActivePairs.slept` (2, K).
+    """
+    bound: float = slept[0, pair] - slept[1, pair] - pair_motion(lipschitz, pair, way)
+    return bound
 
 
 @compiled_part

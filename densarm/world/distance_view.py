@@ -8,6 +8,7 @@ of Pinocchio's `GeometryData` that returns these (K, 10) numbers as an array wou
 """
 
 import ctypes
+import math
 from collections.abc import Iterable
 
 import coal
@@ -155,3 +156,11 @@ def pair_rate(row: Array, twist: Array) -> float:
     rate += (py * nz - pz * ny) * twist[3] + (pz * nx - px * nz) * twist[4]
     rate += (px * ny - py * nx) * twist[5]
     return rate
+
+
+@compiled_part
+def obstacle_speed(twist: Array) -> float:
+    """Return how fast points of an obstacle are at most [m/s], infinite where it turns."""
+    if twist[3] != 0.0 or twist[4] != 0.0 or twist[5] != 0.0:
+        return math.inf
+    return math.sqrt(twist[0] ** 2 + twist[1] ** 2 + twist[2] ** 2)
