@@ -331,7 +331,7 @@ def _density_rows(
         if reach[k] != reaches[1, k]:
             reaches[0, k] = reach[k]
         reach[k] = reaches[1, k] = max(reaches[0, k], margin + far)
-        if state[k] == 0 or h >= far:
+        if state[k] == 0 or (h >= far and not is_moving[k]):
             continue
         if not is_moving[k]:
             row, brake = table[standing], 0.0

@@ -115,19 +115,23 @@ def sleeping_and_awake(with_ball: World) -> list[tuple[ActivePairs, Evasion]]:
 
 @settings(max_examples=40, deadline=None)
 @given(
-    at=st.tuples(*[st.floats(-1.5, 1.5)] * 3),
-    velocity=st.tuples(*[st.floats(-2.0, 2.0)] * 3),
+    way=st.tuples(*[st.floats(-1.0, 1.0)] * 3).filter(lambda way: np.linalg.norm(way) > 0.1),
+    off=st.floats(0.15, 0.6),
+    speed=st.floats(0.0, 2.0),
     pushed=st.tuples(*[st.floats(-1.0, 1.0)] * 7),
 )
 def test_a_pair_that_sleeps_would_ask_for_nothing(
     with_ball: World,
     sleeping_and_awake: list[tuple[ActivePairs, Evasion]],
-    at: Array,
-    velocity: Array,
+    way: Array,
+    off: float,
+    speed: float,
     pushed: Array,
 ) -> None:
+    """A ball that comes at the hand, from near and far."""
     q, v, found = with_ball.arm.postures["ready"], np.array(pushed), []
-    with_ball.move_obstacle("ball", at, velocity=velocity)
+    way = np.array(way) / np.linalg.norm(way)
+    with_ball.move_obstacle("ball", (0.31, 0.0, 0.52) + off * way, velocity=-speed * way)
     for pairs, evasion in sleeping_and_awake:
         assert evasion.is_needed()
         for _ in range(17):  # so that misses are looked for at each of the times ahead
