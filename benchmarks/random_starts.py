@@ -22,7 +22,8 @@ import densarm
 from densarm.cli.bench import print_problem_sets
 from densarm.planning.density_guide import Legs
 from densarm.planning.plan import GUIDES, plan_path
-from densarm.study.problems import ProblemResult, ProblemResults, in_processes, problem_result
+from densarm.study.cluster import in_order
+from densarm.study.problems import ProblemResult, ProblemResults, problem_result
 from densarm.world.configurations import clear_configurations
 from densarm.world.swept_check import SweptCheck
 
@@ -66,7 +67,7 @@ def main() -> int:
     if options.curves:
         return 0 if curves(scenario, starts) == len(starts) else 1
     work = partial(run, options.scenario, options.guide)
-    results = ProblemResults(tuple(in_processes(work, list(enumerate(starts)), options.jobs)))
+    results = ProblemResults(tuple(in_order(work, list(enumerate(starts)), options.jobs)))
     if options.json:
         options.json.write_text(json.dumps(results.to_json(), indent=1), encoding="utf-8")
     print_problem_sets(results)

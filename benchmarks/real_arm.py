@@ -35,7 +35,8 @@ from densarm.planning.plan import plan_path
 from densarm.scene.loading import MotionProblem
 from densarm.simulation.disturbances import Disturbances, Push
 from densarm.study.baselines import ComputedTorque
-from densarm.study.problems import in_processes, scenario_of
+from densarm.study.cluster import as_completed
+from densarm.study.problems import scenario_of
 from densarm.values.outcome import Outcome
 from densarm.world.stopping import StoppingCheck, StoppingTrajectory
 
@@ -284,7 +285,7 @@ def main() -> None:
         known += densarm.load_problems(options.problems)[:: options.every][:PROBLEMS]
     results: list[Result] = []
     items = list(zip(known, range(len(known)), strict=True))
-    for done in in_processes(partial(run_cases, options.form, names), items, options.jobs):
+    for done in as_completed(partial(run_cases, options.form, names), items, options.jobs):
         results += done
         print(f"{done[0].problem}: {sum(r.reached for r in done)} of {len(done)}")
     ordered = sorted(results, key=lambda result: names.index(result.case))

@@ -17,6 +17,7 @@ from densarm.cli.options import (
     plant_options,
     read_disturbances,
     together,
+    worker_options,
 )
 from densarm.cli.output import print_table, progress, write_json
 from densarm.errors import FileContentError
@@ -117,7 +118,7 @@ _set_options = together(
         help="Disturb each joint of each problem by an own number: mass_scale=0.1 from 0.9 to 1.1, "
         "all others, as coulomb=0.5, from 0 to their size.",
     ),
-    number_option("--jobs", 1, "Processes."),
+    worker_options,
     click.option(
         "--save-dir",
         type=click.Path(path_type=Path, file_okay=False),
@@ -137,7 +138,15 @@ _set_options = together(
 @number_option("--problems", 50, "Number of problems.")
 @number_option("--seed", 0, "Seed of scenes, starts, goals and the planner.", least=0)
 @_set_options
-def random(arm: str, scenes: str, problems: int, seed: int, jobs: int, **options: Any) -> None:
+def random(
+    arm: str,
+    scenes: str,
+    problems: int,
+    seed: int,
+    jobs: int,
+    scheduler: str | None,
+    **options: Any,
+) -> None:
     """Move an arm between random configurations among random obstacles.
 
     Spheres, boxes, a wall with a gap or a shelf, in proportion to the arm's reach. Starts and
@@ -156,8 +165,9 @@ def random(arm: str, scenes: str, problems: int, seed: int, jobs: int, **options
         report("loading")
         from densarm.study.random_problems import random_problems
 
-        chosen = random_problems(arm, problems, seed, scenes, jobs, report)
-        finish = _run_set(chosen, report, jobs=jobs, seed=seed, **options)
+        chosen = random_problems(arm, problems, seed, scenes, jobs, report, scheduler)
+        options |= {"jobs": jobs, "scheduler": scheduler, "seed": seed}
+        finish = _run_set(chosen, report, **options)
     finish()
 
 
@@ -218,7 +228,7 @@ def motionbenchmaker(problems: Path, every: int, **options: Any) -> None:
     is_flag=True,
     help="Velocities are not told, but estimated from positions at 100 Hz that err by 5 mm.",
 )
-@number_option("--jobs", 1, "Processes.")
+@worker_options
 @click.option(
     "--save-dir",
     type=click.Path(path_type=Path, file_okay=False),
@@ -230,6 +240,7 @@ def moving(
     trials: int,
     seed: int,
     jobs: int,
+    scheduler: str | None,
     save_dir: Path | None,
     json: Path | None,
     **options: Any,
@@ -252,7 +263,7 @@ def moving(
         from densarm.study.moving import Cell, run_trials, to_json
 
         cell, chosen = Cell(**options), [name.strip() for name in methods.split(",")]
-        outcomes = run_trials(cell, trials, seed, chosen, jobs, save_dir, report)
+        outcomes = run_trials(cell, trials, seed, chosen, jobs, save_dir, report, scheduler)
         if json:
             write_json(json, to_json(cell, outcomes))
     rows = [
@@ -313,6 +324,7 @@ def _run_set(
     *,
     guide: str,
     jobs: int,
+    scheduler: str | None,
     save_dir: Path | None,
     json: Path | None,
     plant: str | None,
@@ -334,7 +346,8 @@ def _run_set(
                 folder.mkdir(parents=True, exist_ok=True)
         except OSError as error:
             raise FileContentError(folder, error.strerror or "cannot be made") from None
-        return run_problems(problems, jobs, report, guide=guide, save_dir=folder, **options)
+        given = {"guide": guide, "save_dir": folder, **options}
+        return run_problems(problems, jobs, report, scheduler, **given)
 
     results = run("auto" if guide == "both" else guide, save_dir)
     direct = run("direct", save_dir and save_dir / "direct") if guide == "both" else None

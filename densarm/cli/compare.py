@@ -5,7 +5,13 @@ from typing import TYPE_CHECKING
 
 import click
 
-from densarm.cli.options import PLOT_ENDINGS, Decorator, number_option, output_option
+from densarm.cli.options import (
+    PLOT_ENDINGS,
+    Decorator,
+    number_option,
+    output_option,
+    worker_options,
+)
 from densarm.cli.output import print_table, progress, write_json
 from densarm.values.outcome import FAILED, RUN_ENDS, Outcome
 
@@ -68,6 +74,7 @@ def disturbance_option(name: str, unit: str, help_text: str) -> Decorator:
 )
 @disturbance_option("--payload", "KG", "Also run each with a mass that no controller knows of.")
 @disturbance_option("--moving", "M/S", "Also run each with a ball of this speed across the way.")
+@worker_options
 @output_option("--plot", "FILE", "Plot outcomes and measures.", PLOT_ENDINGS)
 @output_option("--json", "FILE", "Write every run and the medians as JSON.")
 def compare(
@@ -80,6 +87,8 @@ def compare(
     push: float | None,
     payload: float | None,
     moving: float | None,
+    jobs: int,
+    scheduler: str | None,
     plot: Path | None,
     json: Path | None,
 ) -> None:
@@ -131,6 +140,8 @@ def compare(
             report,
             conditions=[Condition(), *asked],
             budget=budget,
+            jobs=jobs,
+            scheduler=scheduler,
         )
         report("writing")
         if plot:

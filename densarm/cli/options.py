@@ -123,6 +123,16 @@ plant_options = together(
 )
 """Adds --plant and --disturb, a name or None and the keys of a table [disturbances]."""
 
+worker_options = together(
+    number_option("--jobs", 1, "Processes on this machine; from two on by Dask."),
+    click.option(
+        "--scheduler",
+        metavar="ADDRESS",
+        help="Address of a Dask scheduler whose workers run it, as tcp://10.0.0.1:8786.",
+    ),
+)
+"""Adds --jobs and --scheduler."""
+
 PLOT_ENDINGS = (".png", ".pdf", ".svg")
 
 picture_options = together(

@@ -5,7 +5,13 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from densarm.cli.options import PLOT_ENDINGS, number_option, output_option, plant_options
+from densarm.cli.options import (
+    PLOT_ENDINGS,
+    number_option,
+    output_option,
+    plant_options,
+    worker_options,
+)
 from densarm.cli.output import print_figures, progress
 from densarm.values.outcome import RUN_ENDS, Outcome
 
@@ -43,12 +49,7 @@ def _read_ranges(
     "disturbances.payload=0:1. May be repeated.",
 )
 @plant_options
-@number_option("--jobs", 1, "Processes on this machine; from two on by Dask.")
-@click.option(
-    "--scheduler",
-    metavar="ADDRESS",
-    help="Address of a Dask scheduler whose workers run it, as tcp://10.0.0.1:8786.",
-)
+@worker_options
 @output_option("--save", "STUDY.npz", "Keep every run; what is there is not run again.", (".npz",))
 @output_option("--plot", "FILE", "Plot outcomes, their shares and clearances.", PLOT_ENDINGS)
 def study(

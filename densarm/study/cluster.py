@@ -5,7 +5,8 @@ import logging
 import pickle
 import signal
 from collections.abc import Callable, Generator, Iterator, Sequence
-from contextlib import ExitStack, suppress
+from contextlib import ExitStack, closing, suppress
+from functools import partial
 from importlib.util import find_spec
 from threading import Lock
 from typing import Any, TypeVar
@@ -76,6 +77,31 @@ def as_completed(
             doing = f"workers of {scheduler}, dashboard {client.dashboard_link}"
         on_workers(doing)
         yield from _results(distributed, client, work, chunks)
+
+
+def in_order(
+    work: Callable[[Chunk], Result],
+    chunks: Sequence[Chunk],
+    jobs: int = 1,
+    scheduler: str | None = None,
+    on_done: Callable[[int], None] = lambda _: None,
+) -> list[Result]:
+    """Do the same work on many chunks as `as_completed` does, and return all results in order.
+
+    Args and errors are those of `as_completed`; `on_done` is told how many are done, each time.
+    """
+    found: dict[int, Result] = {}
+    numbered = list(enumerate(chunks))
+    with closing(as_completed(partial(_numbered, work), numbered, jobs, scheduler)) as results:
+        for index, result in results:
+            found[index] = result
+            on_done(len(found))
+    return [found[index] for index in range(len(chunks))]
+
+
+def _numbered(work: Callable[[Chunk], Result], item: tuple[int, Chunk]) -> tuple[int, Result]:
+    index, chunk = item
+    return index, work(chunk)
 
 
 def _results(

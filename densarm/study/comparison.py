@@ -3,6 +3,8 @@
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass, field, fields, replace
+from functools import partial
+from itertools import product
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -17,6 +19,7 @@ from densarm.scenarios.run import Drive, run_by
 from densarm.scenarios.scenario import Scenario
 from densarm.simulation.simulate import OnProgress
 from densarm.study.baselines import BASELINES, DENSITIES, MAIN_PARAMETERS
+from densarm.study.cluster import in_order
 from densarm.study.conditions import Condition
 from densarm.study.problems import path_length
 from densarm.values.arrays import Array
@@ -175,6 +178,8 @@ def compare(
     *,
     conditions: Sequence[Condition] = (Condition(),),
     budget: int = 3,
+    jobs: int = 1,
+    scheduler: str | None = None,
 ) -> Comparison:
     """Run baselines from the same starts to the scenario's goal.
 
@@ -194,6 +199,8 @@ def compare(
         on_progress: told what is being done.
         conditions: what is done to the arm; every baseline meets the same from the same start.
         budget: number of values of its main parameter that tuning tries on every baseline.
+        jobs: processes on this machine; 1 for this one.
+        scheduler: address of a Dask scheduler whose workers run it, in place of processes here.
 
     Returns:
         How each run ended. A run that raises an error counts as failed and stops no other.
@@ -202,7 +209,7 @@ def compare(
         UnknownNameError: a baseline that there is not.
         InvalidValueError: a number of starts or a budget below one, of tuning starts below zero, a
             seed that is not a whole number, or a scenario of steps or that commands velocities.
-        DensarmError: no random start was found.
+        DensarmError: no random start was found, or what `as_completed` raises.
     """
     for name in baselines:
         if name not in BASELINES:
@@ -224,34 +231,36 @@ def compare(
     others = clear_configurations(scenario.world, n_others, seed, margin)
     tuning = clear_configurations(scenario.world, n_tuning, seed + _TUNING_SEED, margin)
 
-    def runs(name: str, scale: float, condition: Condition, is_tuning: bool) -> BaselineResult:
-        over, what = (tuning, "tuning start") if is_tuning else ([scenario.start, *others], "start")
-        done = []
-        for k, start in enumerate(over):
-            under = "" if condition == Condition() else f" under {condition.name}"
-            on_progress(f"{name} from {what} {k + 1} of {len(over)}{under}")
-            drawn = (seed + _TUNING_SEED * is_tuning, k)
-            done.append(_run(replace(scenario, start=start), name, scale, condition, drawn))
-        value = scale * MAIN_PARAMETERS[name].default(scenario) if name in MAIN_PARAMETERS else 0.0
-        return BaselineResult(name, tuple(done), scale, value, condition)
+    def results(asked: Sequence[_Asked], over: Sequence[Array], drawn: int) -> list[BaselineResult]:
+        what = "run" if drawn == seed else "tuning run"
+        items = [(*one, k) for one in asked for k in range(len(over))]
 
-    def tuned(name: str) -> float:
-        if not tuning:
-            return 1.0
-        results = [
-            replace(per[0], runs=tuple(run for result in per for run in result.runs))
-            for scale in tried
-            if (per := [runs(name, scale, condition, True) for condition in conditions])
-        ]
-        return best_of(results).scale
+        def tell(count: int) -> None:
+            on_progress(f"{what} {count} of {len(items)}")
 
-    chosen = {name: tuned(name) for name in dict.fromkeys(baselines)}
-    found = [
-        runs(name, scale, condition, False)
-        for condition in conditions
-        for name, scale in chosen.items()
-    ]
+        runs = in_order(partial(_run, scenario, over, drawn), items, jobs, scheduler, tell)
+        found, size = [], len(over)
+        for k, (name, scale, condition) in enumerate(asked):
+            tuned = name in MAIN_PARAMETERS
+            value = scale * MAIN_PARAMETERS[name].default(scenario) if tuned else 0.0
+            own = tuple(runs[k * size : (k + 1) * size])
+            found.append(BaselineResult(name, own, scale, value, condition))
+        return found
+
+    chosen = dict.fromkeys(baselines, 1.0)
+    if tuning:
+        asked = list(product(chosen, tried, conditions))
+        by = iter(results(asked, tuning, seed + _TUNING_SEED))
+        for name in chosen:
+            each = [[next(by) for _ in conditions] for _ in tried]
+            whole = [replace(per[0], runs=sum((r.runs for r in per), ())) for per in each]
+            chosen[name] = best_of(whole).scale
+    asked = [(*method, condition) for condition in conditions for method in chosen.items()]
+    found = results(asked, [scenario.start, *others], seed)
     return Comparison(scenario.name, seed, tuple(found), tuning_starts, budget)
+
+
+_Asked = tuple[str, float, Condition]  # a baseline, its main parameter's scale, and a condition
 
 
 def scales(budget: int) -> list[float]:
@@ -345,9 +354,10 @@ def _rank(result: BaselineResult) -> tuple[int, int, float]:
 
 
 def _run(
-    scenario: Scenario, name: str, scale: float, condition: Condition, seed: tuple[int, int]
+    scenario: Scenario, starts: Sequence[Array], seed: int, item: tuple[str, float, Condition, int]
 ) -> BaselineRun:
-    seconds: list[float] = []
+    name, scale, condition, k = item
+    scenario, seconds = replace(scenario, start=starts[k]), list[float]()
 
     def baseline(scenario: Scenario) -> Drive:
         drive = BASELINES[name](scenario, scale)
@@ -355,7 +365,7 @@ def _run(
 
     start = tuple(scenario.arm.angles(scenario.start).tolist())
     try:
-        scenario, plant = condition.applied(scenario, seed)
+        scenario, plant = condition.applied(scenario, (seed, k))
         run = run_by(scenario, baseline, plant=plant)
     except (ValueError, ArithmeticError, RuntimeError) as error:
         return BaselineRun(start, FAILED, str(error))

@@ -3,11 +3,12 @@
 import json
 import time
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import nullcontext
+from contextlib import ExitStack, closing
 from dataclasses import asdict, dataclass, replace
 from functools import partial
 from importlib.util import find_spec
-from itertools import product
+from itertools import groupby, product
+from operator import itemgetter
 from pathlib import Path
 from typing import Any
 
@@ -28,8 +29,9 @@ from densarm.scene.motion import ConstantVelocity
 from densarm.scene.obstacles import Box, Sphere
 from densarm.scene.scene import Scene
 from densarm.simulation.plants import PinocchioPlant
+from densarm.study.cluster import as_completed
 from densarm.study.evasions import CbfpyEvasion, DamperEvasion, MinkEvasion, StopAndGo
-from densarm.study.problems import in_processes, named_arm
+from densarm.study.problems import named_arm
 from densarm.study.random_problems import Workspace
 from densarm.values.arrays import Array
 from densarm.values.checks import non_negative_integer, one_of, positive, positive_integer
@@ -169,6 +171,7 @@ def run_trials(
     jobs: int = 1,
     save_dir: Path | None = None,
     on_progress: Callable[[str], None] = lambda _: None,
+    scheduler: str | None = None,
 ) -> dict[str, Outcomes]:
     """Run the same trials by each of some methods, at 1 kHz.
 
@@ -177,14 +180,16 @@ def run_trials(
         trials: how many; the first stay the same when there are more.
         seed: of the first trial, the next one's is one more.
         methods: of `METHODS`.
-        jobs: processes.
+        jobs: processes on this machine.
         save_dir: folder of a file of each cell's runs, which are not run again; None to keep none.
         on_progress: told what is being done.
+        scheduler: address of a Dask scheduler whose workers run them, in place of processes here.
 
     Raises:
         InvalidValueError: a number out of its range, or an unknown method.
         FileContentError: the folder cannot be made, or holds a file of something else.
-        DensarmError: no trial was found in many draws, or a peer is not installed.
+        DensarmError: no trial was found in many draws, a peer is not installed, or what
+            `as_completed` raises.
     """
     positive_integer("trials", trials)
     non_negative_integer("seed", seed)
@@ -197,14 +202,18 @@ def run_trials(
     ends = _kept(file) if file else {}
     items = list(product(range(seed, seed + trials), methods))
     missing = [item for item in items if item not in ends]
-    with file.open("a", encoding="utf-8") if file else nullcontext() as kept:
-        found = in_processes(partial(_run, cell), missing, jobs)
-        for count, (item, end) in enumerate(zip(missing, found, strict=False), 1):
-            ends[item] = end
+    of_seed = [list(some) for _, some in groupby(missing, key=itemgetter(0))]
+    with ExitStack() as stack:
+        kept = file and stack.enter_context(file.open("a", encoding="utf-8"))
+        found = as_completed(partial(_run, cell), of_seed, jobs, scheduler)
+        for count, done in enumerate(stack.enter_context(closing(found)), 1):
+            ends |= done
             if kept:
-                kept.write(json.dumps({"seed": item[0], "method": item[1], **asdict(end)}) + "\n")
+                for (number, method), end in done.items():
+                    run = {"seed": number, "method": method, **asdict(end)}
+                    kept.write(json.dumps(run) + "\n")
                 kept.flush()
-            on_progress(f"{count} of {len(missing)} runs")
+            on_progress(f"{count} of {len(of_seed)} trials")
     return {
         method: _outcomes([ends[item] for item in items if item[1] == method]) for method in methods
     }
@@ -320,22 +329,15 @@ def run_trial(trial: Trial, method: str, noise: np.random.Generator | None = Non
     return _End(False, False, reached, float(np.median(spent)))
 
 
-def _run(cell: Cell, item: tuple[int, str]) -> _End:
-    seed, method = item
-    noise = np.random.default_rng([seed, cell.obstacles, 1]) if cell.estimated else None
-    return run_trial(_trial(cell, seed), method, noise)
-
-
-def _trial(cell: Cell, seed: int) -> Trial:
-    key = cell, seed
-    if key not in _drawn:  # the last one alone is asked for again, by the next method
-        arm = load_arm(cell.arm, shapes="capsule")
-        _drawn.clear()
-        _drawn[key] = draw_trial(arm, cell.obstacles, cell.speed, seed, cell.resting)
-    return _drawn[key]
-
-
-_drawn: dict[tuple[Cell, int], Trial] = {}
+def _run(cell: Cell, items: Sequence[tuple[int, str]]) -> dict[tuple[int, str], _End]:
+    """Run one trial by each method."""
+    ends, seed = {}, items[0][0]
+    arm = load_arm(cell.arm, shapes="capsule")
+    trial = draw_trial(arm, cell.obstacles, cell.speed, seed, cell.resting)
+    for _, method in items:
+        noise = np.random.default_rng([seed, cell.obstacles, 1]) if cell.estimated else None
+        ends[seed, method] = run_trial(trial, method, noise)
+    return ends
 
 
 def _furniture(workspace: Workspace) -> Scene:

@@ -1,16 +1,13 @@
 """Problems: from a start to a goal in a scene, one by one or in processes, and their results."""
 
-import signal
 import zlib
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from concurrent.futures import ProcessPoolExecutor
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import lru_cache, partial
-from multiprocessing import get_context
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 
@@ -24,7 +21,8 @@ from densarm.scenarios.scenario import Scenario
 from densarm.scene.loading import MotionProblem
 from densarm.simulation.disturbances import Disturbances
 from densarm.simulation.run import Run
-from densarm.values.checks import one_of, positive_integer
+from densarm.study.cluster import in_order
+from densarm.values.checks import one_of
 from densarm.values.outcome import FAILED, RUN_ENDS, Outcome
 from densarm.values.tables import parse_table
 
@@ -46,9 +44,6 @@ MEASURES = (
 _ALL = TimingParameters(velocity_share=1.0, acceleration_share=1.0, torque_share=1.0)
 _SPACING = 0.02  # of the points that a path is interpolated through [rad or m]
 _DEGREE = 3
-
-Item = TypeVar("Item")
-Result = TypeVar("Result")
 
 
 @dataclass(frozen=True)
@@ -172,14 +167,16 @@ def run_problems(
     problems: Sequence[MotionProblem],
     jobs: int = 1,
     on_progress: Callable[[str], None] = lambda _: None,
+    scheduler: str | None = None,
     **options: Any,
 ) -> ProblemResults:
     """Plan each problem, run its torque-driven closed loop and prove it.
 
     Args:
         problems: what to run.
-        jobs: processes to run them in; 1 for this one.
+        jobs: processes on this machine; 1 for this one.
         on_progress: told what is being done.
+        scheduler: address of a Dask scheduler whose workers run them, in place of processes here.
         options: those of `run_problem`.
 
     Returns:
@@ -188,16 +185,17 @@ def run_problems(
 
     Raises:
         UnknownNameError: a problem of no known robot, or of a joint to lock that it does not have.
-        InvalidValueError: a problem that does not give each joint of the robot one position, or a
-            number of processes below one.
+        InvalidValueError: a problem that does not give each joint of the robot one position.
+        DensarmError: what `as_completed` raises.
     """
     for problem in problems:
         scenario_of(problem)
-    results = []
-    for result in in_processes(partial(run_problem, **options), problems, jobs):
-        results.append(result)
-        on_progress(f"{len(results)} of {len(problems)} problems run")
-    return ProblemResults(tuple(results))
+
+    def tell(count: int) -> None:
+        on_progress(f"{count} of {len(problems)} problems run")
+
+    work = partial(run_problem, **options)
+    return ProblemResults(tuple(in_order(work, problems, jobs, scheduler, tell)))
 
 
 def run_problem(
@@ -326,32 +324,6 @@ def scenario_of(problem: MotionProblem, seed: int = 0, goals: str = GOALS[0]) ->
 def named_arm(name: str, locked_joints: tuple[tuple[str, float], ...] = ()) -> Arm:
     """Return an arm as `load_arm` does, the same one when it is asked for again."""
     return load_arm(name, locked_joints=dict(locked_joints))
-
-
-def in_processes(
-    work: Callable[[Item], Result], items: Sequence[Item], jobs: int
-) -> Iterator[Result]:
-    """Do the same work on many items, and yield the results in the order of the items.
-
-    Args:
-        work: what to do; with its items and results it can be pickled.
-        items: what to do it on.
-        jobs: processes; 1 for this one.
-
-    Raises:
-        InvalidValueError: a number of processes below one.
-    """
-    if positive_integer("jobs", jobs) == 1:
-        yield from map(work, items)
-        return
-    # Ctrl-C reaches the whole group of processes: it ends these at once, and only this one tells.
-    pool = ProcessPoolExecutor(
-        jobs, get_context("spawn"), signal.signal, (signal.SIGINT, signal.SIG_DFL)
-    )
-    try:
-        yield from pool.map(work, items)
-    finally:
-        pool.shutdown(cancel_futures=True)
 
 
 def path_length(run: Run) -> float:

@@ -17,7 +17,8 @@ from densarm.planning.path_guide import PathGuide
 from densarm.scene.loading import MotionProblem
 from densarm.scene.obstacles import Box, Sphere
 from densarm.scene.scene import Scene
-from densarm.study.problems import in_processes, named_arm
+from densarm.study.cluster import in_order
+from densarm.study.problems import named_arm
 from densarm.values.arrays import Array
 from densarm.values.checks import non_negative_integer, one_of, positive_integer
 from densarm.world.separating_planes import SeparatingPlanes
@@ -45,6 +46,7 @@ def random_problems(
     scenes: str = "mixed",
     jobs: int = 1,
     on_progress: Callable[[str], None] = lambda _: None,
+    scheduler: str | None = None,
 ) -> list[MotionProblem]:
     """Draw problems of an arm among random obstacles, of which each has a solution.
 
@@ -60,25 +62,26 @@ def random_problems(
         count: number of problems.
         seed: of the draws.
         scenes: one of `SCENE_KINDS`.
-        jobs: processes to search in.
+        jobs: processes on this machine that search.
         on_progress: told what is being done.
+        scheduler: address of a Dask scheduler whose workers search, in place of processes here.
 
     Raises:
         UnknownNameError: no such arm.
         InvalidValueError: a number of problems below one, a seed that is not a whole number, or
             unknown scenes.
-        DensarmError: no problem was found in many scenes.
+        DensarmError: no problem was found in many scenes, or what `as_completed` raises.
     """
     positive_integer("problems", count)
     non_negative_integer("seed", seed)
     one_of("scenes", scenes, list(SCENE_KINDS))
     named_arm(arm)
-    problems = []
+
+    def tell(drawn: int) -> None:
+        on_progress(f"{drawn} of {count} problems drawn")
+
     draw = partial(_draw_problem, arm, scenes, seed)
-    for problem in in_processes(draw, range(count), jobs):
-        problems.append(problem)
-        on_progress(f"{len(problems)} of {count} problems drawn")
-    return problems
+    return in_order(draw, range(count), jobs, scheduler, tell)
 
 
 class Workspace:

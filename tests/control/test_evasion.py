@@ -93,17 +93,17 @@ def test_rows_of_the_density_hold_unless_no_velocity_in_reach_keeps_them(
 
 
 class Wakeful(Evasion):
-    """Has every pair awake, however far."""
+    """Has every pair of what moves awake, however far."""
 
     def velocity(self, q: Array, v: Array, nominal: Array) -> tuple[Array, bool]:
-        self._pairs.set_reach(np.inf)
+        self._pairs.set_reach(np.where(self._is_moving, np.inf, self._pairs.reach))
         self._pairs.update(q)
         return super().velocity(q, v, nominal)
 
 
 @pytest.fixture(scope="module")
 def sleeping_and_awake(with_ball: World) -> list[tuple[ActivePairs, Evasion]]:
-    """Pairs that sleep as they may, and others that do not, each with what evades by them."""
+    """Pairs that sleep as they may, and some that do not, each with what evades by them."""
     both = []
     for kind in (Evasion, Wakeful):
         with_ball.move_obstacle("ball", (0.0, 0.0, 5.0))

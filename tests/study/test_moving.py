@@ -33,9 +33,12 @@ def test_trials_that_are_kept_are_not_run_again(
 ) -> None:
     asked = []
 
-    def run(cell: Cell, item: tuple[int, str]) -> moving._End:  # noqa: ARG001
-        asked.append(item)
-        return moving._End(item == (1, "density"), False, item[0] == 0, 50.0 + item[0])
+    def run(cell: Cell, items: list[tuple[int, str]]) -> dict[tuple[int, str], moving._End]:  # noqa: ARG001
+        asked.extend(items)
+        return {
+            item: moving._End(item == (1, "density"), False, item[0] == 0, 50.0 + item[0])
+            for item in items
+        }
 
     monkeypatch.setattr(moving, "_run", run)
     run_trials(CELL, 1, 0, ["density"], save_dir=tmp_path)
