@@ -29,7 +29,7 @@ from densarm.density.pose_distance import PoseDistance
 from densarm.density.sub_goals import GuidedDensity, GuidePath, SubGoals
 from densarm.density.unsafe_sets import SensingParameters, UnsafeSet
 from densarm.errors import InvalidValueError
-from densarm.planning.plan import inside_limits
+from densarm.planning.path_margins import inside_limits
 from densarm.values.arrays import Array
 from densarm.values.checks import finite_vector
 from densarm.world.active_pairs import ActivePairs, DistanceBounds

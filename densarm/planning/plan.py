@@ -4,7 +4,6 @@ import math
 import time
 from dataclasses import replace
 from functools import partial
-from itertools import pairwise
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -22,7 +21,8 @@ from densarm.planning.goals import Goal, candidates, goal_list, plan_to_any, way
 from densarm.planning.guide import Guide, NoPath, PlannedPath, PlanningParameters
 from densarm.planning.motion import Motion, PlanningError, TimingParameters
 from densarm.planning.path_guide import PathGuide
-from densarm.planning.portfolio import Ends, quickest_way
+from densarm.planning.path_margins import LIMIT_INSET, ends_between, kept_along, kept_at
+from densarm.planning.portfolio import quickest_way
 from densarm.planning.shortening import shortened
 from densarm.planning.straight import straight_way
 from densarm.values.arrays import Array
@@ -50,8 +50,6 @@ takes 1 to 10.
 
 _EFFORT = 6  # ways that are looked for where any of several goals will do
 
-_LIMIT_INSET = 0.002  # [rad or m] from position limits at which a motion leaves and arrives
-
 # Shares of the path margin and of the planner's iterations, tried in turn: most spaces are wide,
 # and a narrow passage may leave less distance than wanted. Where not all are to be spent, those
 # that are draw samples near both ends above all. Under all margins but the last half of the
@@ -62,9 +60,7 @@ _EVEN_SHARE = 0.995  # of the limits at grid points of a path that bends evenly
 
 _AT_GOAL = 1e-7  # [rad or m]; a shorter way is left to feedback, for rounding shapes its curve
 
-_END_SHARE = 0.5  # of the clearance at start and goal that a path's margin may take
 _SMOOTH_SHARE = 0.8  # of what a path keeps that the smooth path near it keeps
-_HALVINGS = 8  # of what a path keeps, until that is proved
 _STOP_SHARE = 0.5  # of the smooth path's that stopping keeps too; the rest is for tracking errors
 
 
@@ -129,7 +125,7 @@ def plan_motion(
         # No more than the density would: where nothing is sensed it leads straight.
         space, rng = SeparatingPlanes(world, margin, sensing.distance), np.random.default_rng(seed)
         points = shortened(world.arm, space, curve.q, search.shortcuts, rng)
-        kept = _kept_along(legs.check, points, kept)
+        kept = kept_along(legs.check, points, kept)
         stuck, remark = legs.why_stuck(curve), curve.remark
     points, kept = np.vstack([start, points]), _SMOOTH_SHARE * kept
     motion = replace(
@@ -213,7 +209,7 @@ def _planned(
     found = candidates(check, start, goals, seed, search.solutions, path_margin)
     planned = None
     if effort > 1 and guide in ("auto", "path"):
-        between = partial(_ends, check, start)
+        between = partial(ends_between, check, start)
         planned = quickest_way(check, start, found, between, path_margin, search, effort, seed)
     planned = planned or plan_to_any(found[: search.goals], guide, search, plan)
     return replace(planned, plan_time=time.perf_counter() - began)
@@ -225,9 +221,8 @@ def _straight(
     began = time.perf_counter()
     path, segment = straight_way(check, start, line)
     points = path.waypoints
-    ends = np.min([check.distance_margin(q) for q in points[[0, -1]]], axis=0)
-    kept = np.minimum(path_margin, np.maximum(0.0, _END_SHARE * ends))
-    kept, cost = _kept_along(check, points, kept), way_cost(check.arm, points)
+    kept = np.minimum(path_margin, kept_at(check, points[[0, -1]]))
+    kept, cost = kept_along(check, points, kept), way_cost(check.arm, points)
     return PlannedPath(path, kept, time.perf_counter() - began, points[-1], cost), segment
 
 
@@ -243,7 +238,7 @@ def _planned_to(
     """Plan to one goal that is feasible, as is the start."""
     check = legs.check
     world, arm, margin = check.world, check.arm, check.margin
-    depart, arrive, least = _ends(check, start, goal)
+    depart, arrive, least = ends_between(check, start, goal)
     kept = np.minimum(path_margin, least)
     if guide == "direct":
         # Not claimed to be clear: the density bends around what blocks it, or gets stuck there.
@@ -259,14 +254,14 @@ def _planned_to(
     if not isinstance(guide, str):
         path = _checked(arm, guide.plan(depart, arrive, seed), depart, arrive)
         if path.is_clear:
-            kept = _kept_along(check, path.waypoints, kept)
+            kept = kept_along(check, path.waypoints, kept)
         return found(path, kept)
     stuck, remark = "", ""
     if guide != "path":
         space = SeparatingPlanes(world, margin, kept)
         answer = DensityGuide(legs, space, search).plan(depart, arrive, seed)
         if isinstance(answer, GuidePath):
-            kept = _kept_along(check, answer.waypoints, kept)
+            kept = kept_along(check, answer.waypoints, kept)
             return found(answer, kept)
         stuck, remark = answer.reason, answer.remark
         if guide == "density":
@@ -278,12 +273,6 @@ def _planned_to(
         raise PlanningError(error.outcome, error.detail + also) from None
     path = replace(path, stuck=stuck, remark=remark)
     return found(path, kept)
-
-
-def _ends(check: SweptCheck, start: Array, goal: Array) -> Ends:
-    depart, arrive = (inside_limits(check, q) for q in (start, goal))
-    least = np.min([check.distance_margin(q) for q in (start, depart, arrive)], axis=0)
-    return Ends(depart, arrive, np.maximum(0.0, _END_SHARE * least))
 
 
 def _searched(
@@ -318,20 +307,6 @@ def _searched(
     raise PlanningError(Outcome.NO_PATH, f"{reason}, with margins of {tried} mm")
 
 
-def _kept_along(check: SweptCheck, points: Array, kept: Array) -> Array:
-    """Return how much of what pairs shall keep (K,) [m] is proved along a polyline (N, nq)."""
-    for halving in range(_HALVINGS):
-        space = SeparatingPlanes(check.world, check.margin, kept)
-        if not kept.any() or all(space.segment_is_clear(a, b) for a, b in pairwise(points)):
-            return kept
-        if halving == 0:
-            met = np.min([check.distance_margin(q) for q in points], axis=0)
-            kept = np.clip(met, 0.0, kept)
-        else:
-            kept = 0.5 * kept
-    return np.zeros_like(kept)
-
-
 def _checked(arm: Arm, answer: object, start: Array, goal: Array) -> GuidePath:
     """Return the path that somebody's own guide found, once it is known to be one."""
     if isinstance(answer, NoPath):
@@ -347,7 +322,7 @@ def _checked(arm: Arm, answer: object, start: Array, goal: Array) -> GuidePath:
         raise InvalidValueError(what, answer.waypoints, f"{allowed}, got {points.shape}")
     checked = [arm.check_configuration("waypoint of the guide", point) for point in points]
     for name, at, q in (("first", 0, start), ("last", -1, goal)):
-        if np.abs(arm.difference(q, checked[at])).max() > _LIMIT_INSET:
+        if np.abs(arm.difference(q, checked[at])).max() > LIMIT_INSET:
             allowed = f"the {'start' if at == 0 else 'goal'} {q.tolist()}"
             raise InvalidValueError(f"{name} waypoint of the guide", checked[at], allowed)
     return GuidePath(np.array(checked), bool(answer.is_clear))
@@ -387,18 +362,3 @@ def _timed(
     stopping = StoppingCheck(world, stops, margin, _STOP_SHARE * kept)
     share = _EVEN_SHARE if is_rounded else GRID_SHARE
     return time_path(arm, path, length, period, timing, stopping, time_limit, grid_share=share)
-
-
-def inside_limits(check: SweptCheck, q: Array) -> Array:
-    """Return where to leave or to reach q (nq,), at which the density must not vanish.
-
-    A configuration at a position limit is on the rim of an unsafe set. The motion keeps a little
-    inside, well within what counts as reached, unless something touches there.
-    """
-    arm, limits = check.arm, check.arm.limits
-    low, high = limits.lower + _LIMIT_INSET, limits.upper - _LIMIT_INSET
-    angles = arm.angles(q)
-    if np.array_equal(angles, clipped := np.clip(angles, low, high)):
-        return q
-    inside = arm.configurations(clipped)
-    return inside if check.segment_is_clear(q, inside) else q

@@ -3,13 +3,13 @@
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import NamedTuple
 
 import numpy as np
 
 from densarm.planning.goals import Candidate, way_cost
 from densarm.planning.guide import GuidePath, PlannedPath, PlanningParameters
 from densarm.planning.path_guide import PathGuide
+from densarm.planning.path_margins import Ends
 from densarm.planning.rounding import rounded, way_time
 from densarm.values.arrays import Array
 from densarm.world.separating_planes import SeparatingPlanes
@@ -19,17 +19,6 @@ _NEAR_ENOUGH = 1.03  # times the straight way's time, in which no other way to t
 _ITERATIONS, _SHORTCUTS, _BENDS = 800, 100, 400  # of each way
 _FINAL = 1500  # bends that are tried on the quickest
 _SHARES = 1.0, 0.25  # of the path margin, tried in turn
-
-
-class Ends(NamedTuple):
-    """Where a way to a goal begins and ends, inside position limits."""
-
-    depart: Array
-    """Its first configuration (nq,)."""
-    arrive: Array
-    """Its last (nq,)."""
-    least: Array
-    """What pairs may keep beyond the safety margin there (K,) [m]."""
 
 
 def quickest_way(

@@ -25,7 +25,8 @@ from densarm.density.navigation_density import density_towards
 from densarm.errors import InvalidValueError
 from densarm.planning.guide import Guide, GuidePath, PlannedPath
 from densarm.planning.motion import Motion, PlanningError
-from densarm.planning.plan import GUIDES, inside_limits, plan_motion, plan_path
+from densarm.planning.path_margins import inside_limits
+from densarm.planning.plan import GUIDES, plan_motion, plan_path
 from densarm.scenarios.control import ControlForm
 from densarm.scenarios.perform import perform
 from densarm.scenarios.scenario import Scenario, load_scenario
