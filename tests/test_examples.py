@@ -304,3 +304,13 @@ def test_own_robot(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixtur
     out = capsys.readouterr().out
     assert out.startswith("reached in")
     assert "not proved" not in out
+
+
+@pytest.mark.slow
+def test_way_points(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    run_example(monkeypatch, "way_points.py")
+    reached, passes, proved = capsys.readouterr().out.splitlines()
+    assert reached.startswith("reached after 1.")
+    assert reached.endswith("certified: True")
+    assert float(passes.split()[-2]) > 0.5
+    assert proved.startswith("2 passed in their order within their blends")

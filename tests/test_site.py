@@ -54,7 +54,8 @@ def test_every_key_is_told() -> None:
     parsed = {**scenario.TABLES, "robot": scenario._RobotTable, "task": scenario._TaskTable}
     for table, kind in parsed.items():
         assert names(f"[{table}]") == {field.name for field in fields(kind)}
-    assert names("[[steps]]") == set(steps._KEYS)
+    moves = {field.name for field in fields(steps._MoveTable)}
+    assert names("[[steps]]") == set(steps._KEYS) | moves
     assert names("line, of [[steps]]") == {field.name for field in fields(steps._LineTable)}
     for word, kind in OBSTACLE_TYPES.items():
         own = names(f'type = "{word}"') | names("[[obstacles]]") - {"type"}

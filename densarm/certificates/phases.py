@@ -1,6 +1,6 @@
 """Certificate of a run of several phases: each by itself, and how one goes on from another."""
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from itertools import pairwise
 from typing import Any, NamedTuple
@@ -34,6 +34,10 @@ REST_VELOCITY = 1e-3
 LINE = "line"
 """Key of a task's settings: the segment that a phase says it leads a frame along."""
 
+WAY_POINTS = "way_points"
+"""Key of a task's settings: positions that a phase says it passes, and how far off at most."""
+
+_NONE: Mapping[str, Any] = {"positions": (), "blend": 1.0}
 _SAME = 1e-9  # [rad, m], room for rounding
 _FAR = 1e3  # [m] that pairs which are not asked for keep beyond all distances
 
@@ -62,12 +66,14 @@ def certify_phases(phases: Sequence[Phase]) -> Certificate:
     Each part of their own certificates holds where it does in all of them. Beside these: each phase
     begins where the last ended, the first at rest, of the same robot, as fast as that, or at rest
     where what is held or moves changes (joined); bodies are held, or put down, where they were
-    (held); frames are led along lines (line); and what a held body may touch it enters by no more
-    than `CONTACT_DEPTH`, on such a line alone (support).
+    (held); frames are led along lines (line); way points are passed one after another (way
+    points); and what a held body may touch it enters by no more than `CONTACT_DEPTH`, on such a
+    line alone (support).
     """
     names = dict.fromkeys(check.name for phase in phases for check in phase.certificate.checks)
     merged = (_merged(name, phases) for name in names)
-    return Certificate((*merged, _joined(phases), _held(phases), _line(phases), _support(phases)))
+    own = (part(phases) for part in (_joined, _held, _line, _way_points, _support))
+    return Certificate((*merged, *own))
 
 
 def positions_of(arm: Arm, q: Array, names: Sequence[str]) -> Array:
@@ -231,6 +237,29 @@ def _between(arm: Arm, frame: str, phase: Phase) -> float:
     bend = np.abs(np.diff(phase.v, axis=0, append=phase.v[-1:])) / dt @ reach
     bend += 2.0 * speed.sum(axis=1) * (speed @ reach)
     return float(bend.max()) * dt**2 / 8.0
+
+
+def _way_points(phases: Sequence[Phase]) -> Check:
+    """Prove that way points are passed in their order: by samples, each after the last one's."""
+    name, worst, at, count, before = "way points", 0.0, 0.0, 0, 0.0
+    for k, phase in enumerate(phases, start=1):
+        said, arm, row = phase.task.settings.get(WAY_POINTS, _NONE), phase.task.arm, 0
+        blend = float(said["blend"])
+        for n, angles in enumerate(said["positions"], start=1):
+            off = np.abs(arm.difference(arm.configuration(angles), phase.q[row:])).max(axis=1)
+            nearest = int(off.argmin())
+            time = before + (row + nearest) * phase.task.simulation.dt
+            if not off[nearest] <= blend:
+                far = f"way point {n} is {off[nearest]:.2g} away, and may be {blend:g}"
+                return Check(name, False, f"phase {k} ({phase.task.title}): {far}", None, time)
+            if (share := float(off[nearest] / blend)) >= worst:
+                worst, at = share, time
+            row, count = row + int((off <= blend).argmax()), count + 1
+        before += phase.duration
+    if not count:
+        return Check(name, None, "does not apply: no phase passes any", None, 0.0)
+    detail = f"{count} passed in their order within their blends, of which {worst:.0%} used"
+    return Check(name, True, f"{detail} at t = {at:.3f} s", 1.0 - worst, at)
 
 
 def _support(phases: Sequence[Phase]) -> Check:

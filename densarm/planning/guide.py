@@ -1,7 +1,10 @@
 """Guide: what supplies the sub-goals between a start and a goal, and what it answers."""
 
 from dataclasses import dataclass
-from typing import Protocol
+from typing import NamedTuple, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
 
 from densarm.density.sub_goals import GuidePath
 from densarm.errors import InvalidValueError
@@ -10,6 +13,8 @@ from densarm.values.checks import non_negative, non_negative_integer, positive, 
 from densarm.values.documented import documented
 
 __all__ = ["FreeSpace", "Guide", "GuidePath", "NoPath", "PlanningParameters"]
+
+_PATH_SHARE = 0.8  # of the blend at way points
 
 
 @documented
@@ -91,6 +96,22 @@ class NoPath:
     """As `GuidePath.remark`."""
 
 
+class WayPoints(NamedTuple):
+    """What a path passes on its way, one after another."""
+
+    q: Array
+    """Configurations (M, nq)."""
+    blend: float
+    """How far off each joint may be when it passes one, so that it need not stop [rad or m]."""
+    rows: NDArray[np.int64]
+    """Points of the path that pass them, counted from its end, hence negative (M,)."""
+
+    @property
+    def within(self) -> float:
+        """How far off a path may be [rad or m]; the rest is for tracking errors."""
+        return _PATH_SHARE * self.blend
+
+
 @documented
 @dataclass(frozen=True, eq=False)
 class PlannedPath:
@@ -110,6 +131,8 @@ class PlannedPath:
     """What the way costs, as `way_cost` has it [s]."""
     is_rounded: bool = False
     """Whether it is of points close to each other, bent evenly where that makes it quicker."""
+    way_points: WayPoints | None = None
+    """What it passes; None for nothing but its ends."""
 
 
 class Guide(Protocol):

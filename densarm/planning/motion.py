@@ -10,6 +10,7 @@ import numpy as np
 
 from densarm.density.sub_goals import GuidePath
 from densarm.errors import DensarmError, InvalidValueError
+from densarm.planning.guide import WayPoints
 from densarm.values.arrays import Array
 from densarm.values.checks import positive
 from densarm.values.documented import documented, in_short
@@ -106,6 +107,8 @@ class Motion:
     """The sub-goals that led it; None where none did."""
     goal: Array | None = None
     """Configuration that it was planned to (nq,), of several the one that was chosen."""
+    way_points: WayPoints | None = None
+    """What it passes on the way; None where nothing was asked for."""
     plan_time: float = 0.0
     """Wall-clock time that the search for them took [s]; zero without a search."""
     detail: str = ""

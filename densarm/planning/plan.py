@@ -25,6 +25,7 @@ from densarm.planning.path_margins import LIMIT_INSET, ends_between, kept_along,
 from densarm.planning.portfolio import quickest_way
 from densarm.planning.shortening import shortened
 from densarm.planning.straight import straight_way
+from densarm.planning.way_points import BLEND, planned_through
 from densarm.values.arrays import Array
 from densarm.values.checks import non_negative, non_negative_integer, one_of
 from densarm.values.outcome import Outcome
@@ -70,6 +71,8 @@ def plan_motion(
     goal: Goal | Line,
     guide: str | Guide = "auto",
     *,
+    through: Goal | None = None,
+    blend: float = BLEND,
     margin: float = 0.0,
     seed: int = 0,
     path_margin: float = PATH_MARGIN,
@@ -97,6 +100,9 @@ def plan_motion(
             finds none, the density leads, and the least cost is what counts. Or a `Line`, which a
             frame follows within 0.25 mm and 2.5 mrad, whatever the guide.
         guide: supplies the sub-goals: one of `GUIDES`, or a `Guide`.
+        through: way points: configurations and poses that it passes one after another without a
+            stop; none where the goal is a `Line`, or the guide's ways are not proved clear.
+        blend: how far off each joint may be where it passes one [rad or m], at least 0.01.
         margin: safety margin m [m]; it must hold at start and goal too.
         seed: of the guide's random choices.
         path_margin: distance that paths keep beyond m [m].
@@ -114,10 +120,19 @@ def plan_motion(
         InvalidValueError: no configuration, an unknown guide, or a value out of its range.
     """
     legs, line = _legs(world, margin, density, alpha, kappa, sensing), None
+
+    def planned_to(q: ArrayLike, goal: Goal) -> PlannedPath:
+        return _planned(legs, q, goal, guide, seed, path_margin, search)
+
     if isinstance(goal, Line):
+        if through is not None:
+            raise InvalidValueError("through", through, "left out where the goal is a Line")
         planned, line = _straight(legs.check, start, goal, path_margin)
+    elif through is not None:
+        ways = goal_list(world.arm, through, "way point")
+        planned = planned_through(legs.check, start, ways, goal, blend, seed, planned_to)
     else:
-        planned = _planned(legs, start, goal, guide, seed, path_margin, search)
+        planned = planned_to(start, goal)
     points, kept = planned.path.waypoints, planned.kept
     stuck, remark = "", planned.path.remark
     if not planned.path.is_clear:
@@ -129,10 +144,11 @@ def plan_motion(
         stuck, remark = legs.why_stuck(curve), curve.remark
     points, kept = np.vstack([start, points]), _SMOOTH_SHARE * kept
     motion = replace(
-        _timed(world, margin, kept, points, period, timing, time_limit, line, planned.is_rounded),
+        _timed(world, margin, kept, points, period, timing, time_limit, line, planned),
         margin=margin,
         path=planned.path,
         goal=planned.goal,
+        way_points=planned.way_points,
         plan_time=planned.plan_time,
         detail=stuck,
         remark=remark,
@@ -337,7 +353,7 @@ def _timed(
     timing: TimingParameters,
     time_limit: float,
     line: Segment | None,
-    is_rounded: bool,
+    planned: PlannedPath,
 ) -> Motion:
     """Return a smooth motion near a curve (N, nq) that keeps so much beyond the margin (K,) [m]."""
     arm = world.arm
@@ -350,8 +366,11 @@ def _timed(
     from densarm.planning.timing import time_path
     from densarm.planning.topp_ra import GRID_SHARE
 
-    path = blended_path(world, margin, curve, kept) if is_rounded else None
-    path = path or smooth_path(world, margin, curve, kept, line)
+    path, passed = None, planned.way_points
+    if planned.is_rounded:
+        path = blended_path(world, margin, curve, kept, way_points=passed)
+    if path is None and passed is None:
+        path = smooth_path(world, margin, curve, kept, line)
     if path is None:
         near = (
             "the planning system's curve is proved clear" if line is None else "the line is clear"
@@ -360,5 +379,5 @@ def _timed(
         raise PlanningError(Outcome.NO_PATH, reason)
     stops = StoppingTrajectory(arm, timing.acceleration_share, timing.torque_share)
     stopping = StoppingCheck(world, stops, margin, _STOP_SHARE * kept)
-    share = _EVEN_SHARE if is_rounded else GRID_SHARE
+    share = _EVEN_SHARE if planned.is_rounded else GRID_SHARE
     return time_path(arm, path, length, period, timing, stopping, time_limit, grid_share=share)

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from densarm.arms.arm import Arm
-from densarm.planning.guide import FreeSpace
+from densarm.planning.guide import FreeSpace, WayPoints
 from densarm.values.arrays import Array
 from densarm.values.kernels import compiled, compiled_part
 
@@ -39,20 +39,50 @@ def rounded(
         using Optimal Bounded-Acceleration Shortcuts, ICRA 2010, with cubics in the place of timed
         parabolas.
     """
-    points, allowed = _resampled(arm, path), _allowed(arm)
+    nothing = WayPoints(np.zeros((0, arm.nq)), 0.0, np.zeros(0, np.int64))
+    return rounded_through(arm, freedom, path, nothing, tries, rng)[0]
+
+
+def rounded_through(
+    arm: Arm,
+    freedom: FreeSpace,
+    path: Array,
+    way_points: WayPoints,
+    tries: int,
+    rng: np.random.Generator,
+) -> tuple[Array, WayPoints]:
+    """Return a path as `rounded` does, which passes way points as the first does, and its rows.
+
+    Where a cubic would be too far off one, two meet there, so that it is no corner.
+
+    Args:
+        arm: the joint space.
+        freedom: proves segments.
+        path: waypoints (W, nq), as there.
+        way_points: what it passes.
+        tries: number of pairs of points.
+        rng: draws them.
+    """
+    points, at = _resampled(arm, path)
+    rows, within, allowed = at[way_points.rows], way_points.within, _allowed(arm)
     lowest = np.minimum(arm.limits.lower + _INSET, points.min(axis=0))
     highest = np.maximum(arm.limits.upper - _INSET, points.max(axis=0))
-    box, other = np.stack([lowest, highest]), np.empty_like(points)
-    draws = np.empty((tries, 3), np.int64)
+    box = np.stack([np.tile(x, (len(points), 1)) for x in (lowest, highest)])
+    asked = points[rows] + arm.difference(path[way_points.rows], way_points.q)
+    box[0, rows] = np.maximum(lowest, np.minimum(asked - within, points[rows]))
+    box[1, rows] = np.minimum(highest, np.maximum(asked + within, points[rows]))
+    other, draws = np.empty_like(points), np.empty((tries, 3), np.int64)
     draws[:, :2] = np.sort(rng.integers(len(points), size=(tries, 2)))
     draws[:, 2] = np.minimum(rng.integers(2 * arm.nv, size=tries), arm.nv)
     least, k = _time(points, allowed), 0
-    while k := _next_quicker(points, draws, k, allowed, box, (1.0 - _LEAST_GAIN) * least, other):
+    while k := _next_quicker(
+        points, draws, k, allowed, rows, box, (1.0 - _LEAST_GAIN) * least, other
+    ):
         begin, end = draws[k - 1, 0], draws[k - 1, 1]
         if freedom.polyline_is_clear(other[begin : end + 1]):
             points[begin : end + 1] = other[begin : end + 1]
             least = _time(points, allowed)
-    return arm.configurations(points)
+    return arm.configurations(points), way_points._replace(rows=rows - len(points))
 
 
 def way_time(arm: Arm, path: Array) -> float:
@@ -65,7 +95,7 @@ def way_time(arm: Arm, path: Array) -> float:
     about holds at points close to each other, a corner at one being a bend of half of the segments
     beside it. A little is added for the length.
     """
-    return float(_time(_resampled(arm, path), _allowed(arm)))
+    return float(_time(_resampled(arm, path)[0], _allowed(arm)))
 
 
 def _allowed(arm: Arm) -> Array:
@@ -74,14 +104,14 @@ def _allowed(arm: Arm) -> Array:
     return np.minimum(limits, _UNLIMITED)
 
 
-def _resampled(arm: Arm, path: Array) -> Array:
-    """Return joint positions (N, nv) along a path, its waypoints (W, nq) among them, N >= 3."""
+def _resampled(arm: Arm, path: Array) -> tuple[Array, NDArray[np.int64]]:
+    """Return joint positions (N, nv) along a path, N >= 3, and its waypoints among them (W,)."""
     steps = arm.difference(path[:-1], path[1:])
     whole = np.ceil(np.linalg.norm(steps, axis=1) / _SPACING - _SLIGHT).astype(int)
     parts = np.maximum(whole, 2 if len(path) == 2 else 1)
     each = np.repeat(steps / parts[:, np.newaxis], parts, axis=0)
     points: Array = arm.angles(path[0]) + np.vstack([np.zeros(arm.nv), np.cumsum(each, axis=0)])
-    return points
+    return points, np.append(0, np.cumsum(parts))
 
 
 @compiled
@@ -90,6 +120,7 @@ def _next_quicker(
     draws: NDArray[np.int64],
     first: int,
     allowed: Array,
+    rows: NDArray[np.int64],
     box: Array,
     most: float,
     out: Array,
@@ -101,7 +132,8 @@ def _next_quicker(
         draws: two points, and the joint that is bent, nv for all (M, 3).
         first: how many of them were looked at.
         allowed: as `_allowed` returns it.
-        box: lowest and highest positions (2, nv) [rad or m].
+        rows: points that are passed (M,).
+        box: lowest and highest positions of each point (2, N, nv) [rad or m].
         most: the time [s].
         out: the way (N, nv), overwritten.
 
@@ -112,11 +144,11 @@ def _next_quicker(
         begin, end, joint = draws[k, 0], draws[k, 1], draws[k, 2]
         if end - begin < 2:
             continue
-        _bend(points, begin, end, joint, out)
+        _bend(points, begin, end, joint, rows, box, out)
         is_inside = True
         for i in range(begin + 1, end):
             for j in range(points.shape[1]):
-                if out[i, j] < box[0, j] or out[i, j] > box[1, j]:
+                if out[i, j] < box[0, i, j] or out[i, j] > box[1, i, j]:
                     is_inside = False
         if is_inside and _time(out, allowed) < most:
             return k + 1
@@ -124,30 +156,69 @@ def _next_quicker(
 
 
 @compiled_part
-def _bend(points: Array, begin: int, end: int, joint: int, out: Array) -> None:
-    """Write the path with a cubic between two of its points, of one joint or of all (nv)."""
+def _bend(
+    points: Array,
+    begin: int,
+    end: int,
+    joint: int,
+    rows: NDArray[np.int64],
+    box: Array,
+    out: Array,
+) -> None:
+    """Write the path with a cubic between two of its points, of one joint or of all (nv).
+
+    Where that leaves the box of a point that is passed, two meet at the near side of the box, in
+    the direction from the beginning of the one to the end of the other.
+    """
     n, nv = points.shape
     for i in range(n):
         for j in range(nv):
             out[i, j] = points[i, j]
+    before = _way(points, max(begin - 1, 0), begin)
+    after = _way(points, end, min(end + 1, n - 1))
+    for j in range(nv) if joint == nv else range(joint, joint + 1):
+        first, last = points[begin, j], points[end, j]
+        slope_a = (first - points[begin - 1, j]) / before if before > _SLIGHT else math.nan
+        slope_b = (points[end + 1, j] - last) / after if after > _SLIGHT else math.nan
+        _cubic(points, begin, end, j, slope_a, slope_b, out)
+        near = begin
+        for row in rows:
+            if not begin < row < end:
+                continue
+            at = min(max(out[row, j], box[0, row, j]), box[1, row, j])
+            if at != out[row, j]:
+                out[row, j] = at
+                slope = (last - out[near, j]) / (_way(points, near, end) + _SLIGHT)
+                _cubic(points, near, row, j, slope_a, slope, out)
+                _cubic(points, row, end, j, slope, slope_b, out)
+                near, slope_a = row, slope
+
+
+@compiled_part
+def _way(points: Array, begin: int, end: int) -> float:
     length = 0.0
     for i in range(begin, end):
         length += _apart(points, i, i + 1)
-    before = _apart(points, begin - 1, begin) if begin > 0 else 0.0
-    after = _apart(points, end, end + 1) if end < n - 1 else 0.0
+    return length
+
+
+@compiled_part
+def _cubic(
+    points: Array, begin: int, end: int, j: int, slope_a: float, slope_b: float, out: Array
+) -> None:
+    """Write a cubic of a joint between two points that are written, of slopes there or NaN."""
+    length = _way(points, begin, end)
     if length < _SLIGHT:
         return
-    for j in range(nv) if joint == nv else range(joint, joint + 1):
-        a, b = points[begin, j], points[end, j]
-        slope_a = (a - points[begin - 1, j]) * length / before if before > _SLIGHT else math.nan
-        slope_b = (points[end + 1, j] - b) * length / after if after > _SLIGHT else math.nan
-        slope_a, slope_b = _known(slope_a, slope_b, b - a), _known(slope_b, slope_a, b - a)
-        gone = 0.0
-        for i in range(begin + 1, end):
-            gone += _apart(points, i - 1, i)
-            u = gone / length
-            w = 1.0 - u
-            out[i, j] = a + u * u * (3.0 - 2.0 * u) * (b - a) + u * w * (w * slope_a - u * slope_b)
+    a, b = out[begin, j], out[end, j]
+    slope_a, slope_b = length * slope_a, length * slope_b
+    slope_a, slope_b = _known(slope_a, slope_b, b - a), _known(slope_b, slope_a, b - a)
+    gone = 0.0
+    for i in range(begin + 1, end):
+        gone += _apart(points, i - 1, i)
+        u = gone / length
+        w = 1.0 - u
+        out[i, j] = a + u * u * (3.0 - 2.0 * u) * (b - a) + u * w * (w * slope_a - u * slope_b)
 
 
 @compiled_part

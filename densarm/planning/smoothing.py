@@ -4,9 +4,11 @@ from collections.abc import Iterator
 from itertools import pairwise
 
 import numpy as np
+from numpy.typing import NDArray
 
 from densarm.arms.arm import Arm
 from densarm.arms.line import Segment
+from densarm.planning.guide import WayPoints
 from densarm.values.arrays import Array
 from densarm.world.separating_planes import SeparatingPlanes, configuration_tube
 from densarm.world.swept_check import SweptCheck, SweptVerdict
@@ -15,6 +17,7 @@ from densarm.world.world import World
 STRAIGHT = (2.5e-4, 2.5e-3)
 """Largest distance and turn of a frame from the line that a plan leads it along [m, rad]."""
 
+_ROUNDING = 1e-9  # [rad or m]
 _DEGREE = 3
 _WIDEST = 0.8  # [rad] between control points at first
 _HALVINGS = 9
@@ -40,6 +43,7 @@ class SmoothPath:
 
     def __init__(self, knots: Array, control: Array) -> None:
         self.knots = knots
+        self.control = control
         self._control = [control]  # of each derivative
         for degree in (_DEGREE, _DEGREE - 1):
             own = self._knots(_DEGREE - degree)
@@ -98,13 +102,18 @@ def smooth_path(
 
 
 def blended_path(
-    world: World, margin: float, curve: Array, kept: float | Array = 0.0, widest: float = _WIDEST
+    world: World,
+    margin: float,
+    curve: Array,
+    kept: float | Array = 0.0,
+    widest: float = _WIDEST,
+    way_points: WayPoints | None = None,
 ) -> SmoothPath | None:
     """Return a C² path as `smooth_path` does, which blends corners as widely as is clear.
 
-    The knots of its spline get denser only where it is not proved clear, and control points are
-    those of the polyline at averages of three knots, so that it goes along straight segments at an
-    even rate: both let a motion be quicker.
+    The knots of its spline get denser only where it is not proved clear, or does not pass a way
+    point, and control points are those of the polyline at averages of three knots, so that it goes
+    along straight segments at an even rate: both let a motion be quicker.
 
     Args:
         world: the arm among obstacles.
@@ -112,6 +121,7 @@ def blended_path(
         curve: polyline (N, nq).
         kept: what each pair, or all, keep beyond the margin (K,) [m].
         widest: distance between knots at first, on the polyline [rad or m].
+        way_points: what the polyline passes, and the path as it does.
 
     Source: I. J. Schoenberg, On Spline Functions, 1967, for the control points.
     """
@@ -122,8 +132,14 @@ def blended_path(
         knots = np.pad(breaks, _DEGREE, mode="edge")
         at = (knots[1:-3] + knots[2:-2] + knots[3:-1]) / _DEGREE
         control = np.column_stack([np.interp(at, length, column) for column in corner.T])
-        path = SmoothPath(knots / length[-1], control)
+        path, missed = SmoothPath(knots / length[-1], control), np.zeros(0)
+        if way_points is not None:
+            passed = length[way_points.rows]
+            path = _passing(path, passed / length[-1], corner[way_points.rows])
+            missed = passed[_misses(world.arm, path, passed / length[-1], way_points)]
         halved = ~np.fromiter(_clear_pieces(proof, path, length[-1]), dtype=np.bool_)
+        for at in missed:
+            halved |= (breaks[:-1] <= at) & (at <= breaks[1:])
         if not halved.any():
             return path
         while halved.any():
@@ -141,6 +157,23 @@ def polyline(arm: Arm, curve: Array) -> tuple[Array, Array]:
     steps = arm.difference(curve[:-1], curve[1:])
     corner = arm.angles(curve[0]) + np.vstack([np.zeros(arm.nv), np.cumsum(steps, axis=0)])
     return corner, np.append(0.0, np.cumsum(np.linalg.norm(steps, axis=1)))
+
+
+def _passing(path: SmoothPath, s: Array, points: Array) -> SmoothPath:
+    """Return the path nearest to one, by control points, that passes points (M, nv) at s (M,).
+
+    Its ends stay. Where it has too few control points it does not pass all of them.
+    """
+    control = path.control.copy()
+    basis = SmoothPath(path.knots, np.eye(len(control)))(s)[:, 1:-1]
+    control[1:-1] += np.linalg.pinv(basis) @ (points - path(s))
+    return SmoothPath(path.knots, control)
+
+
+def _misses(arm: Arm, path: SmoothPath, s: Array, way_points: WayPoints) -> NDArray[np.bool_]:
+    """Return of which way points a path is too far off at s (M,)."""
+    off = np.abs(arm.difference(way_points.q, arm.configurations(path(s)))).max(axis=1)
+    return np.asarray(off > way_points.within + _ROUNDING)
 
 
 def _is_straight(world: World, path: SmoothPath, line: Segment | None) -> bool:

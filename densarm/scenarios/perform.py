@@ -13,7 +13,7 @@ from densarm.arms.arm import Arm
 from densarm.arms.joints import with_moving, without_mimics
 from densarm.arms.line import Line
 from densarm.arms.models import frame_index
-from densarm.certificates.phases import LINE, body_poses, positions_of
+from densarm.certificates.phases import LINE, WAY_POINTS, body_poses, positions_of
 from densarm.certificates.task import Task
 from densarm.control.tracking import DensityTracking
 from densarm.density.goal_distance import TorusDistance
@@ -208,6 +208,9 @@ class _Cell:
         prepared = time.perf_counter() - began
         told = Disturbances() if isinstance(step, Grip) else self._scenario.disturbances
         task = replace(task, goal=motion.goal)
+        if (passed := motion.way_points) is not None:
+            says = {"positions": arm.angles(passed.q).tolist(), "blend": passed.blend}
+            task = replace(task, settings={**task.settings, WAY_POINTS: says})
         done = simulate_task(task, world, controller, None, told, self._on_progress)
         self._leave(done)
         path = motion.path or GuidePath(motion.position, is_clear=True)
@@ -223,15 +226,15 @@ class _Cell:
         if isinstance(step, Wait):
             rest = np.tile(world.arm.angles(start), (2, 1))
             return Motion(period, rest, np.zeros_like(rest), goal=start, world=world), ""
+        options = scenario.plan_options
         if isinstance(step, Line):
             goal = step
         elif isinstance(step, MoveTo):
             goal, passed_over = self._goals(k, world, step.goal)
+            options |= {"through": step.through, "blend": step.blend}
         elif isinstance(step, Grip):
             positions = gripper_positions(scenario.arm.description, step)
             goal = world.arm.configuration([positions[name] for name in world.arm.joint_names])
-        options = scenario.plan_options
-        if isinstance(step, Grip):
             options |= {"density": DensityParameters()}
         limit = scenario.simulation.time_limit
         timed: dict[str, Any] = {"period": period, "timing": scenario.timing, "time_limit": limit}

@@ -12,6 +12,7 @@ from densarm.arms.models import frame_index
 from densarm.arms.pose import Pose
 from densarm.errors import InvalidValueError, UnknownNameError
 from densarm.planning.goals import Goal, goal_list
+from densarm.planning.way_points import BLEND, checked_blend
 from densarm.scenarios.goal_values import read_goal
 from densarm.scene.obstacles import HalfSpace, Obstacle
 from densarm.scene.scene import Scene
@@ -23,16 +24,28 @@ from densarm.values.tables import parse_table
 @documented
 @dataclass(frozen=True, eq=False)
 class MoveTo:
-    """Go to a goal, and of several to one from which the lines that follow can be gone."""
+    """Go to a goal, and of several to one from which the lines that follow can be gone.
+
+    Raises:
+        InvalidValueError: a blend that is not a number >= 0.01.
+    """
 
     goal: Goal
     """A configuration, a pose, or a list of these, of which any will do."""
+    through: Goal | None = None
+    """Way points: configurations and poses that it passes one after another without a stop."""
+    blend: float = BLEND
+    """How far off each joint may be where it passes one, at least 0.01 [rad or m]."""
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "blend", checked_blend(self.blend))
 
     def __str__(self) -> str:
+        passing = "" if self.through is None else ", through way points"
         if isinstance(self.goal, Pose):
             where = ", ".join(f"{x:.4g}" for x in self.goal.position)
-            return f"move {self.goal.frame!r} to ({where}) m"
-        return "move to a goal"
+            return f"move {self.goal.frame!r} to ({where}) m{passing}"
+        return f"move to a goal{passing}"
 
 
 @documented
@@ -124,6 +137,8 @@ def require_step(name: str, step: object) -> Step:
 def parse_steps(arm: Arm, tables: Any) -> tuple[Step, ...]:
     """Return the steps of tables of TOML, each of one key: what is done, with its value.
 
+    A move has those of its way points besides.
+
     Raises:
         DensarmError: a step that is none, with its number and key.
     """
@@ -141,14 +156,14 @@ def parse_steps(arm: Arm, tables: Any) -> tuple[Step, ...]:
 
 
 def _parsed(arm: Arm, name: str, table: Any) -> Step:
+    if isinstance(table, Mapping) and "move_to" in table:
+        return _move(arm, name, parse_table(name, _MoveTable, table))
     if not isinstance(table, Mapping) or len(table) != 1:
         raise InvalidValueError(name, table, f"a table of one key of {', '.join(_KEYS)}")
     ((key, value),) = table.items()
     if key not in _KEYS:
         raise UnknownNameError(f"key of {name}", key, _KEYS)
     name = f"{name}.{key}"
-    if key == "move_to":
-        return MoveTo(read_goal(arm, name, value))
     if key == "line":
         to = value.get("to") if isinstance(value, Mapping) else None
         if not isinstance(to, Mapping):
@@ -165,7 +180,21 @@ def _parsed(arm: Arm, name: str, table: Any) -> Step:
     return parse_table(name, Attach, value) if key == "attach" else parse_table(name, Detach, value)
 
 
+def _move(arm: Arm, name: str, table: "_MoveTable") -> MoveTo:
+    goal, through = read_goal(arm, f"{name}.move_to", table.move_to), None
+    if table.through is not None:
+        through = read_goal(arm, f"{name}.through", table.through)
+    return MoveTo(goal, through, table.blend)
+
+
 _KEYS = ("move_to", "line", "grip", "attach", "detach", "wait")
+
+
+@dataclass(frozen=True)
+class _MoveTable:
+    move_to: Any
+    through: Any = None
+    blend: float = BLEND
 
 
 @dataclass(frozen=True)
@@ -199,7 +228,8 @@ def check_steps(arm: Arm, scene: Scene, steps: Sequence[Step]) -> None:
         if isinstance(step, Grip):
             gripper_positions(arm.description, step)
         if isinstance(step, MoveTo):
-            for goal in goal_list(arm, step.goal, name):
+            ways = [] if step.through is None else goal_list(arm, step.through, f"{name}.through")
+            for goal in [*goal_list(arm, step.goal, name), *ways]:
                 if isinstance(goal, Pose):
                     frame_index(arm.model, goal.frame, f"frame of {name}")
     if isinstance(steps[-1], Attach | Detach):

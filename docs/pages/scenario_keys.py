@@ -14,6 +14,7 @@ from densarm.arms.arm import load_arm
 from densarm.arms.line import Line
 from densarm.arms.pose import Pose
 from densarm.control.tracking import TRACKING_GAINS
+from densarm.planning.way_points import BLEND
 from densarm.scenarios import scenario
 from densarm.scenarios.steps import Attach, Detach
 from densarm.scene import scene
@@ -64,8 +65,10 @@ _TASK = [
         "there are [steps](tasks.md).",
     ),
 ]
-_STEPS = [  # one of them in each table
+_STEPS = [  # one of them in each table, and what a move has besides
     Key("move_to", "as a goal", "–", "Where to go, as [task] goal."),
+    Key("through", "as a goal", "–", "Beside `move_to`: way points, in their order, as goals are."),
+    Key("blend", "number", f"{BLEND:g}", "Beside it: how far off each joint may be at these."),
     Key("line", "table", "–", "A straight way of a frame, below."),
     Key("grip", "table", "–", "Position of each joint of a gripper [rad or m], by its name."),
     Key("attach", "table", "–", "A body that is taken, below."),

@@ -11,7 +11,7 @@ import pytest
 import densarm
 from densarm.arms.arm import Arm
 from densarm.certificates.certificate import Certificate
-from densarm.certificates.phases import LINE, Phase, certify_phases
+from densarm.certificates.phases import LINE, WAY_POINTS, Phase, certify_phases
 from densarm.errors import FileContentError
 from densarm.scene.scene import Scene
 from densarm.simulation.run import Run
@@ -130,6 +130,20 @@ def test_a_frame_off_its_line(phases: list[Phase]) -> None:
     settings = {**phases[LIFT].task.settings, LINE: line}
     off = phases[LIFT]._replace(task=replace(phases[LIFT].task, settings=settings))
     assert failing([*phases[:LIFT], off, *phases[LIFT + 1 :]]) == ["line"]
+
+
+def test_way_points_that_are_passed_otherwise(phases: list[Phase]) -> None:
+    """The first phase passes where it is after 0.3 and 0.6 s, in this order alone."""
+
+    def told(rows: list[int], off: float) -> list[Phase]:
+        positions = phases[0].task.arm.angles(phases[0].q[rows]) + off
+        settings = {WAY_POINTS: {"positions": positions.tolist(), "blend": 0.01}}
+        task = replace(phases[0].task, settings={**phases[0].task.settings, **settings})
+        return [phases[0]._replace(task=task), *phases[1:]]
+
+    assert certify_phases(told([300, 600], 0.005)).certified
+    assert failing(told([600, 300], 0.0)) == ["way points"]
+    assert failing(told([300], 0.03)) == ["way points"]
 
 
 def test_a_body_that_may_touch_does_not_enter(phases: list[Phase]) -> None:

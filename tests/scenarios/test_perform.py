@@ -87,6 +87,22 @@ def test_the_next_grasp_is_taken_and_the_others_told(can_on_a_table: World) -> N
     assert "and can overlap by" in run.remark
 
 
+def test_a_move_passes_its_way_points(can_on_a_table: World, tmp_path: Path) -> None:
+    arm = can_on_a_table.arm
+    aside = densarm.Pose(TCP, [0.45, 0.3, 0.45], DOWN, "z")
+    raised = arm.configuration([0.3, -0.4, 0.0, -1.8, 0.0, 1.6, 0.8])
+    above = densarm.Pose(TCP, [0.5, -0.2, 0.315], DOWN, "z")
+    move = densarm.MoveTo(above, through=[aside, raised], blend=0.03)
+    run = ended(can_on_a_table, move, densarm.Line(TCP, along=[0.0, 0.0, 0.1]))
+    assert (run.outcome, run.certified) == (Outcome.REACHED, True), run.detail
+    run.save(tmp_path / "run.npz")
+    by_name = {check.name: check for check in Run.load(tmp_path / "run.npz").certificate.checks}
+    assert by_name["way points"].detail.startswith("2 passed in their order within their blends")
+    q, v = run.phases[0].q, run.phases[0].v
+    nearest = np.abs(arm.difference(raised, q)).max(axis=1).argmin()
+    assert np.abs(v[nearest]).max() > 0.2
+
+
 def test_no_grasp_leads_on(can_on_a_table: World) -> None:
     beside = densarm.Pose(TCP, [0.5, -0.17, 0.315], DOWN)
     run = ended(can_on_a_table, densarm.MoveTo(beside), densarm.Line(TCP, along=[0.0, 0.0, 0.1]))

@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -51,6 +52,21 @@ def test_every_kind_of_step(tmp_path: Path) -> None:
     ]
 
 
+def test_way_points_are_told_beside_a_move(tmp_path: Path) -> None:
+    beside = '\nthrough = ["ready", { frame = "panda_hand_tcp", position = [0.5, 0, 0.4] }]'
+    plain, wide = load(
+        tmp_path, 'move_to = "ready"' + beside, f'blend = 0.1{beside}\nmove_to = "ready"'
+    ).steps
+    assert isinstance(plain, densarm.MoveTo)
+    assert isinstance(wide, densarm.MoveTo)
+    through: Any = plain.through
+    posture, pose = through
+    assert posture == pytest.approx(densarm.load_arm("panda").postures["ready"])
+    assert pose == densarm.Pose(TCP, [0.5, 0.0, 0.4])
+    assert (plain.blend, wide.blend) == (0.05, 0.1)
+    assert str(plain) == "move to a goal, through way points"
+
+
 def test_a_body_may_touch_its_support_in_the_line_beside_alone() -> None:
     up, rest = densarm.Line(TCP, by=[0.0, 0.0, 0.1]), densarm.Wait(1.0)
     take, put = densarm.Attach("a", "hand", 1.0, "table"), densarm.Detach("a", "box")
@@ -68,6 +84,13 @@ def test_a_body_may_touch_its_support_in_the_line_beside_alone() -> None:
         (['line = { frame = "panda_hand_tcp" }'], "steps[0].line = []: must be told by one of to"),
         (['line = { frame = "panda_hand_tcp", by = [0, 1] }'], "steps[0].by = (0.0, 1.0): must be"),
         (['line = { frame = "tcp", by = [0, 0, 1] }'], "unknown frame of steps[0] 'tcp'"),
+        (['move_to = "ready"\nthrough = "redy"'], "unknown posture for steps[0].through 'redy'"),
+        (['move_to = "ready"\nblend = 0'], "steps[0].blend = 0.0: must be at least 0.01 rad or m"),
+        (['move_to = "ready"\nwait = 1'], "unknown key of [steps[0]] 'wait'"),
+        (
+            ['move_to = "ready"\nthrough = { frame = "tcp", position = [0, 0, 1] }'],
+            "unknown frame of steps[0] 'tcp'",
+        ),
         (["grip = { panda_joint1 = 0.1 }"], "unknown joint of a gripper 'panda_joint1'"),
         (["wait = -1"], "steps[0].wait = -1.0: must be a finite number > 0"),
         ([WAIT, 'detach = "can_1"'], "steps[1].detach = 'can_1': must be one of the held: none"),
