@@ -15,7 +15,7 @@ import densarm
 from densarm import Arm
 from densarm.planning import timing
 from densarm.planning.smoothing import SmoothPath
-from densarm.study.problems import motion_time
+from densarm.study.measures import motion_time
 from densarm.world.stopping import StoppingCheck
 
 ALL = densarm.TimingParameters(velocity_share=1.0, acceleration_share=1.0, torque_share=1.0)

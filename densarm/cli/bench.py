@@ -118,6 +118,12 @@ _set_options = together(
         help="Disturb each joint of each problem by an own number: mass_scale=0.1 from 0.9 to 1.1, "
         "all others, as coulomb=0.5, from 0 to their size.",
     ),
+    click.option(
+        "--acceleration",
+        type=float,
+        help="Limit of every joint, in place of the arm's own [rad/s² or m/s²].",
+    ),
+    click.option("--jerk", type=float, help="The same [rad/s³ or m/s³]."),
     worker_options,
     click.option(
         "--save-dir",
@@ -197,6 +203,7 @@ def motionbenchmaker(problems: Path, every: int, **options: Any) -> None:
     Example:
       densarm bench motionbenchmaker --problems panda.json --every 10 --json results.json
       densarm bench motionbenchmaker --problems panda.json --goals pose
+      densarm bench motionbenchmaker --problems panda.json --acceleration 15 --jerk 500
       densarm bench motionbenchmaker --problems panda.json --plant mujoco --draw mass_scale=0.1
     """  # noqa: D301
     with progress() as report:

@@ -21,7 +21,7 @@ from densarm.simulation.simulate import OnProgress
 from densarm.study.baselines import BASELINES, DENSITIES, MAIN_PARAMETERS
 from densarm.study.cluster import in_order
 from densarm.study.conditions import Condition
-from densarm.study.problems import path_length
+from densarm.study.measures import path_length
 from densarm.values.arrays import Array
 from densarm.values.checks import non_negative_integer, positive_integer
 from densarm.values.outcome import FAILED, RUN_ENDS, Outcome

@@ -12,9 +12,8 @@ from typing import Any
 import numpy as np
 
 from densarm.arms.arm import Arm, load_arm
-from densarm.certificates.task import PLANTS, REACHED_POSITION, REACHED_VELOCITY
+from densarm.certificates.task import PLANTS
 from densarm.errors import FileContentError, InvalidValueError
-from densarm.planning.motion import PlanningError, TimingParameters
 from densarm.scenarios.control import ControlParameters
 from densarm.scenarios.run import run as run_scenario
 from densarm.scenarios.scenario import Scenario
@@ -22,6 +21,7 @@ from densarm.scene.loading import MotionProblem
 from densarm.simulation.disturbances import Disturbances
 from densarm.simulation.run import Run
 from densarm.study.cluster import in_order
+from densarm.study.measures import motion_time, path_length, shortest_time
 from densarm.values.checks import one_of
 from densarm.values.outcome import FAILED, RUN_ENDS, Outcome
 from densarm.values.tables import parse_table
@@ -40,10 +40,6 @@ MEASURES = (
     "path_length_rad",
 )
 """What percentiles are taken of, as `ProblemResult` calls it."""
-
-_ALL = TimingParameters(velocity_share=1.0, acceleration_share=1.0, torque_share=1.0)
-_SPACING = 0.02  # of the points that a path is interpolated through [rad or m]
-_DEGREE = 3
 
 
 @dataclass(frozen=True)
@@ -188,8 +184,9 @@ def run_problems(
         InvalidValueError: a problem that does not give each joint of the robot one position.
         DensarmError: what `as_completed` raises.
     """
+    limits: dict[str, Any] = {key: options.get(key) for key in ("acceleration", "jerk")}
     for problem in problems:
-        scenario_of(problem)
+        scenario_of(problem, **limits)
 
     def tell(count: int) -> None:
         on_progress(f"{count} of {len(problems)} problems run")
@@ -208,6 +205,8 @@ def run_problem(
     disturb: Mapping[str, Any] = MappingProxyType({}),
     draw: Mapping[str, float] = MappingProxyType({}),
     goals: str = GOALS[0],
+    acceleration: float | None = None,
+    jerk: float | None = None,
 ) -> ProblemResult:
     """Plan a problem, run its closed loop and prove it; an error becomes a result.
 
@@ -222,10 +221,12 @@ def run_problem(
         disturb: how it differs from the model, as the keys of a table ``[disturbances]``.
         draw: what of this is drawn, as `drawn` does it.
         goals: one of `GOALS`.
+        acceleration: limit of every joint, as `scenario_of`.
+        jerk: the same.
     """
 
     def run() -> Run:
-        scenario = scenario_of(problem, seed, goals)
+        scenario = scenario_of(problem, seed, goals, acceleration=acceleration, jerk=jerk)
         told = {**disturb, **drawn(draw, problem, seed, scenario.arm.nv)}
         scenario = replace(
             scenario,
@@ -289,19 +290,30 @@ def problem_result(
         return ProblemResult(scene, index, FAILED, str(error))
 
 
-def scenario_of(problem: MotionProblem, seed: int = 0, goals: str = GOALS[0]) -> Scenario:
+def scenario_of(
+    problem: MotionProblem,
+    seed: int = 0,
+    goals: str = GOALS[0],
+    *,
+    acceleration: float | None = None,
+    jerk: float | None = None,
+) -> Scenario:
     """Return a problem of a known robot as a scenario with default parameters.
 
     Args:
         problem: of a known robot.
         seed: of the planner.
         goals: one of `GOALS`: the problem's goal, or the end effector's pose there.
+        acceleration: limit of every joint [rad/s² or m/s²]; None for the robot's own.
+        jerk: the same [rad/s³ or m/s³].
 
     Raises:
         UnknownNameError: no such robot, or joint to lock.
-        InvalidValueError: it does not give each joint of the robot one position.
+        InvalidValueError: it does not give each joint of the robot one position, or a limit that
+            is not positive.
     """
-    arm = named_arm(problem.robot, tuple(sorted(problem.locked_joints.items())))
+    locked = tuple(sorted(problem.locked_joints.items()))
+    arm = named_arm(problem.robot, locked, acceleration, jerk)
     if sorted(problem.joints) != sorted(arm.joint_names):
         allowed = f"the joints of {problem.robot}, {', '.join(arm.joint_names)}"
         raise InvalidValueError("metadata.joints", list(problem.joints), allowed)
@@ -321,54 +333,17 @@ def scenario_of(problem: MotionProblem, seed: int = 0, goals: str = GOALS[0]) ->
 
 
 @lru_cache(maxsize=1)
-def named_arm(name: str, locked_joints: tuple[tuple[str, float], ...] = ()) -> Arm:
-    """Return an arm as `load_arm` does, the same one when it is asked for again."""
-    return load_arm(name, locked_joints=dict(locked_joints))
+def named_arm(
+    name: str,
+    locked_joints: tuple[tuple[str, float], ...] = (),
+    acceleration: float | None = None,
+    jerk: float | None = None,
+) -> Arm:
+    """Return an arm as `load_arm` does, the same one when it is asked for again.
 
-
-def path_length(run: Run) -> float:
-    """Return the length of a run's way in joint space [rad or m]."""
-    steps = run.task.arm.difference(run.q[:-1], run.q[1:])
-    return float(np.linalg.norm(steps, axis=1).sum())
-
-
-def motion_time(run: Run) -> float:
-    """Return the time from which on the arm is at the goal and at rest [s]; infinite if never."""
-    if run.task.goal is None:
-        return np.inf
-    error = np.abs(run.task.arm.difference(run.q, run.task.goal)).max(axis=1)
-    away = (error > REACHED_POSITION) | (np.abs(run.v).max(axis=1) > REACHED_VELOCITY)
-    k = int(np.flatnonzero(away).max(initial=-1)) + 1
-    return float(run.time[k]) if k < len(run.time) else np.inf
-
-
-def shortest_time(run: Run) -> float | None:
-    """Return the shortest time along the path of a run, from rest to rest [s].
-
-    All of the velocity, acceleration and torque limits may be used, with no regard to stopping.
-    The path is a cubic spline through points of the run, and TOPP-RA times it. None for an arm that
-    did not move, or of limits that allow no motion.
-
-    Source: Pham and Pham, A New Approach to Time-Optimal Path Parameterization Based on
-        Reachability Analysis, IEEE T-RO 2018.
+    Where it is given, all joints have one limit of acceleration, or of jerk.
     """
-    # SciPy and TOPP-RA take a second to import.
-    from scipy.interpolate import make_interp_spline
-
-    from densarm.planning.smoothing import SmoothPath, polyline
-    from densarm.planning.timing import time_path
-
-    arm = run.task.arm
-    angles, arc = polyline(arm, run.q)
-    length = float(arc[-1])
-    if length < _SPACING:
-        return None
-    at = np.linspace(0.0, length, max(_DEGREE, round(length / _SPACING)) + 1)
-    points = np.column_stack([np.interp(at, arc, column) for column in angles.T])
-    spline = make_interp_spline(at / length, points, k=_DEGREE)
-    path = SmoothPath(spline.t, spline.c)
-    try:
-        period = run.task.simulation.control_period
-        return time_path(arm, path, length, period, _ALL, has_rates=False).duration
-    except PlanningError:
-        return None
+    arm = load_arm(name, locked_joints=dict(locked_joints), jerk=jerk)
+    if acceleration is None:
+        return arm
+    return Arm(replace(arm.description, acceleration=(acceleration,) * arm.nv))

@@ -1,12 +1,11 @@
 """Problems by the dozen: the same for the same seed, and no run is lost."""
 
 import json
-from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
 import pytest
 
+from densarm.errors import InvalidValueError
 from densarm.scenarios.scenario import Scenario
 from densarm.scene.loading import MotionProblem
 from densarm.scene.obstacles import Sphere
@@ -16,9 +15,8 @@ from densarm.study.problems import (
     MEASURES,
     ProblemResult,
     ProblemResults,
-    motion_time,
     run_problems,
-    shortest_time,
+    scenario_of,
 )
 from densarm.study.random_problems import random_problems
 from densarm.values.outcome import FAILED, RUN_ENDS
@@ -99,27 +97,12 @@ def test_a_run_that_fails_stops_no_other(monkeypatch: pytest.MonkeyPatch) -> Non
     )
 
 
-def test_time_of_a_motion_is_when_the_goal_is_held(swing_up_run: Run) -> None:
-    time = motion_time(swing_up_run)
-    hold = swing_up_run.task.simulation.hold_time
-    assert time == pytest.approx(swing_up_run.time[-1] - hold, abs=0.5 * hold)
-    cut = replace(swing_up_run, time=swing_up_run.time[:50], q=swing_up_run.q[:50])
-    assert motion_time(replace(cut, v=swing_up_run.v[:50])) == np.inf
-    without_goal = replace(swing_up_run, task=replace(swing_up_run.task, goal=None))
-    assert motion_time(without_goal) == np.inf
-
-
-def test_no_motion_is_faster_than_the_time_optimal_one(swing_up_run: Run) -> None:
-    optimal = shortest_time(swing_up_run)
-    assert optimal is not None
-    assert 0.8 * motion_time(swing_up_run) < optimal < motion_time(swing_up_run)
-
-
-def test_time_optimal_motion_of_one_joint_is_that_of_its_limits(swing_up_run: Run) -> None:
-    """The elbow hanging: half of the turn faster and faster, half slower and slower."""
-    arm = swing_up_run.task.arm
-    angles = np.column_stack([np.zeros(200), np.linspace(0.0, 0.3, 200)])
-    turn = replace(swing_up_run, q=arm.configurations(angles))
-    bang_bang = 2.0 * np.sqrt(0.3 / arm.limits.acceleration[1])
-    assert shortest_time(turn) == pytest.approx(bang_bang, rel=0.06)
-    assert shortest_time(replace(turn, q=turn.q[:1])) is None
+def test_limits_of_every_joint_may_be_others_than_the_arms() -> None:
+    problems = random_problems("two_link", 1, 0, "none")
+    limits = scenario_of(problems[0], acceleration=7.0, jerk=50.0).arm.limits
+    assert (limits.acceleration.tolist(), limits.jerk.tolist()) == ([7.0, 7.0], [50.0, 50.0])
+    slow = run_problems(problems, acceleration=1.0, jerk=20.0).results[0]
+    assert slow.certified
+    assert (slow.duration_s or 0.0) > (run_problems(problems).results[0].duration_s or 9.0)
+    with pytest.raises(InvalidValueError, match=r"acceleration = -1.0: must be"):
+        run_problems(problems, acceleration=-1.0)
