@@ -25,7 +25,8 @@ def main() -> None:
             densarm.Grip({"panda_finger_joint1": 0.0335}),  # [m], short of touching it
             densarm.Attach("can", "panda_hand", mass=0.35, support="table"),  # [kg]
             densarm.Line(TCP, by=[0.0, 0.0, 0.1]),  # lift, upwards in the world [m]
-            densarm.MoveTo(densarm.Pose(TCP, [0.5, 0.2, 0.315], DOWN, free="z")),
+            # What points up of the hand, and so of the can, stays within 0.1 rad of that.
+            densarm.MoveTo(densarm.Pose(TCP, [0.5, 0.2, 0.315], DOWN, free="z"), upright=TCP),
             densarm.Line(TCP, by=[0.0, 0.0, -0.1]),
             densarm.Detach("can", support="table"),
             densarm.Grip({"panda_finger_joint1": 0.038}),

@@ -121,7 +121,7 @@ def carrying_steps() -> tuple[Step, ...]:
         densarm.Grip({"panda_finger_joint1": 0.0336}),
         densarm.Attach("can", "panda_hand", 0.3, "table"),
         densarm.Line(TCP, by=[0.0, 0.0, 0.1]),
-        densarm.MoveTo(beyond),
+        densarm.MoveTo(beyond, upright=TCP),
         densarm.Line(TCP, by=[0.0, 0.0, -0.1]),
         densarm.Detach("can", "table"),
         densarm.Grip({"panda_finger_joint1": 0.038}),

@@ -116,17 +116,23 @@ def swept_result(
 ) -> SweptResult:
     """Return the swept check of a motion recorded each dt [s], q (N, nq) and v (N, nv).
 
-    Pairs count as apart beyond a distance, each its own (K,), or one for all [m].
+    Pairs count as apart beyond a distance, each its own (K,), or one for all [m]. Obstacles with a
+    motion are where it has them.
+    """
+    time = dt * np.arange(len(q), dtype=np.float64)
+    return SweptCheck(world, kept=kept).check(q, departure(v, dt), time)
 
-    Between samples the true motion departs from the chord by at most a Δt²/8, a the largest
-    acceleration of the step and its neighbours. Obstacles with a motion are where it has them.
+
+def departure(v: Array, dt: float) -> Array:
+    """Return how far a motion recorded each dt [s] departs from its chords (N - 1, nv) [rad or m].
+
+    Between samples, of velocities (N, nv), that is at most a Δt²/8, a the largest acceleration of
+    the step and its neighbours.
     """
     acceleration = np.abs(np.diff(v, axis=0)) / dt
     k = np.arange(len(acceleration))
     around = np.max([acceleration[np.clip(k + by, 0, len(k) - 1)] for by in (-1, 0, 1)], axis=0)
-    return SweptCheck(world, kept=kept).check(
-        q, around * dt**2 / 8.0, dt * np.arange(len(q), dtype=np.float64)
-    )
+    return np.asarray(around * dt**2 / 8.0)
 
 
 def replay_errors(task: Task, q: Array, v: Array, tau: Array) -> Array:

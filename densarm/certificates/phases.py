@@ -14,7 +14,8 @@ from densarm.arms.description import PER_JOINT, RobotDescription
 from densarm.arms.line import Segment
 from densarm.arms.models import frame_index
 from densarm.arms.self_collision import Exclusion
-from densarm.certificates.certificate import Certificate, Check, swept_result
+from densarm.arms.upright import Upright
+from densarm.certificates.certificate import Certificate, Check, departure, swept_result
 from densarm.certificates.task import Task
 from densarm.scene.obstacles import Obstacle, obstacle_pose
 from densarm.values.arrays import Array
@@ -36,6 +37,9 @@ LINE = "line"
 
 WAY_POINTS = "way_points"
 """Key of a task's settings: positions that a phase says it passes, and how far off at most."""
+
+UPRIGHT = "upright"
+"""Key of a task's settings: the frame that a phase says it keeps upright, and within what angle."""
 
 _NONE: Mapping[str, Any] = {"positions": (), "blend": 1.0}
 _SAME = 1e-9  # [rad, m], room for rounding
@@ -67,12 +71,12 @@ def certify_phases(phases: Sequence[Phase]) -> Certificate:
     begins where the last ended, the first at rest, of the same robot, as fast as that, or at rest
     where what is held or moves changes (joined); bodies are held, or put down, where they were
     (held); frames are led along lines (line); way points are passed one after another (way
-    points); and what a held body may touch it enters by no more than `CONTACT_DEPTH`, on such a
-    line alone (support).
+    points); frames tilt no farther than they may, between samples too (upright); and what a held
+    body may touch it enters by no more than `CONTACT_DEPTH`, on such a line alone (support).
     """
     names = dict.fromkeys(check.name for phase in phases for check in phase.certificate.checks)
     merged = (_merged(name, phases) for name in names)
-    own = (part(phases) for part in (_joined, _held, _line, _way_points, _support))
+    own = (part(phases) for part in (_joined, _held, _line, _way_points, _upright, _support))
     return Certificate((*merged, *own))
 
 
@@ -260,6 +264,27 @@ def _way_points(phases: Sequence[Phase]) -> Check:
         return Check(name, None, "does not apply: no phase passes any", None, 0.0)
     detail = f"{count} passed in their order within their blends, of which {worst:.0%} used"
     return Check(name, True, f"{detail} at t = {at:.3f} s", 1.0 - worst, at)
+
+
+def _upright(phases: Sequence[Phase]) -> Check:
+    worst, at, count, before = 0.0, 0.0, 0, 0.0
+    for k, phase in enumerate(phases, start=1):
+        if UPRIGHT in phase.task.settings:
+            upright, dt = Upright.from_json(phase.task.settings[UPRIGHT]), phase.task.simulation.dt
+            arm, q, off = phase.task.arm, phase.q, departure(phase.v, dt)
+            bounds = np.append(upright.tilts(arm, q[:1]), upright.largest_tilts(arm, q, off))
+            row, count = max(int(bounds.argmax()) - 1, 0), count + 1
+            time, most = before + row * dt, float(bounds.max())
+            if not most <= upright.within:
+                far = f"{upright.frame!r} may tilt by {most:.3g} rad, not {upright.within:.3g}"
+                return Check("upright", False, f"phase {k} ({phase.task.title}): {far}", None, time)
+            if most / upright.within >= worst:
+                worst, at = most / upright.within, time
+        before += phase.duration
+    if not count:
+        return Check("upright", None, "does not apply: nothing is kept upright", None, 0.0)
+    detail = f"{count} phases keep a frame upright, {worst:.0%} of the angle used at t = {at:.3f} s"
+    return Check("upright", True, detail, 1.0 - worst, at)
 
 
 def _support(phases: Sequence[Phase]) -> Check:

@@ -6,8 +6,11 @@ from typing import NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from densarm.arms.arm import Arm
+from densarm.arms.upright import Upright
 from densarm.density.sub_goals import GuidePath
 from densarm.errors import InvalidValueError
+from densarm.planning.path_margins import LIMIT_INSET
 from densarm.values.arrays import Array
 from densarm.values.checks import non_negative, non_negative_integer, positive, positive_integer
 from densarm.values.documented import documented
@@ -133,6 +136,8 @@ class PlannedPath:
     """Whether it is of points close to each other, bent evenly where that makes it quicker."""
     way_points: WayPoints | None = None
     """What it passes; None for nothing but its ends."""
+    upright: Upright | None = None
+    """What it keeps upright; None for nothing."""
 
 
 class Guide(Protocol):
@@ -173,3 +178,26 @@ class FreeSpace(Protocol):
         Joint positions (N, nv) [rad or m], N >= 2; continuous joints count their turns.
         """
         ...
+
+
+def checked_path(arm: Arm, answer: object, start: Array, goal: Array) -> GuidePath:
+    """Return the path that somebody's own guide found, once it is known to be one.
+
+    Raises:
+        InvalidValueError: it is none, or does not lead from start to goal (nq,).
+    """
+    if not isinstance(answer, GuidePath):
+        raise InvalidValueError("answer of the guide", answer, "a GuidePath or a NoPath")
+    what, allowed = "waypoints of the guide", f"of shape (W, {arm.nq}), W >= 2"
+    try:
+        points = np.asarray(answer.waypoints, dtype=np.float64)
+    except (TypeError, ValueError):  # no numbers, or rows of different lengths
+        raise InvalidValueError(what, answer.waypoints, allowed) from None
+    if points.ndim != 2 or len(points) < 2 or points.shape[1] != arm.nq:
+        raise InvalidValueError(what, answer.waypoints, f"{allowed}, got {points.shape}")
+    checked = [arm.check_configuration("waypoint of the guide", point) for point in points]
+    for name, at, q in (("first", 0, start), ("last", -1, goal)):
+        if np.abs(arm.difference(q, checked[at])).max() > LIMIT_INSET:
+            allowed = f"the {'start' if at == 0 else 'goal'} {q.tolist()}"
+            raise InvalidValueError(f"{name} waypoint of the guide", checked[at], allowed)
+    return GuidePath(np.array(checked), bool(answer.is_clear))

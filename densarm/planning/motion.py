@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from densarm.arms.upright import Upright
 from densarm.density.sub_goals import GuidePath
 from densarm.errors import DensarmError, InvalidValueError
 from densarm.planning.guide import WayPoints
@@ -109,6 +110,8 @@ class Motion:
     """Configuration that it was planned to (nq,), of several the one that was chosen."""
     way_points: WayPoints | None = None
     """What it passes on the way; None where nothing was asked for."""
+    upright: Upright | None = None
+    """What it keeps upright; None where nothing was asked for."""
     plan_time: float = 0.0
     """Wall-clock time that the search for them took [s]; zero without a search."""
     detail: str = ""

@@ -8,9 +8,9 @@ from functools import partial
 import numpy as np
 from numpy.typing import ArrayLike
 
-from densarm.arms.arm import Arm
 from densarm.arms.line import Line, Segment
 from densarm.arms.pose import Pose
+from densarm.arms.upright import TILT, Upright
 from densarm.density.goal_distance import TorusDistance
 from densarm.density.navigation_density import DensityParameters
 from densarm.density.sub_goals import GuidePath
@@ -18,13 +18,21 @@ from densarm.density.unsafe_sets import SensingParameters
 from densarm.errors import InvalidValueError
 from densarm.planning.density_guide import ALONE, DensityGuide, Legs
 from densarm.planning.goals import Goal, candidates, goal_list, plan_to_any, way_cost
-from densarm.planning.guide import Guide, NoPath, PlannedPath, PlanningParameters
+from densarm.planning.guide import (
+    FreeSpace,
+    Guide,
+    NoPath,
+    PlannedPath,
+    PlanningParameters,
+    checked_path,
+)
 from densarm.planning.motion import Motion, PlanningError, TimingParameters
 from densarm.planning.path_guide import PathGuide
-from densarm.planning.path_margins import LIMIT_INSET, ends_between, kept_along, kept_at
+from densarm.planning.path_margins import ends_between, kept_along, kept_at
 from densarm.planning.portfolio import quickest_way
 from densarm.planning.shortening import shortened
 from densarm.planning.straight import straight_way
+from densarm.planning.upright import UprightSpace, planned_upright
 from densarm.planning.way_points import BLEND, planned_through
 from densarm.values.arrays import Array
 from densarm.values.checks import non_negative, non_negative_integer, one_of
@@ -73,6 +81,8 @@ def plan_motion(
     *,
     through: Goal | None = None,
     blend: float = BLEND,
+    upright: str | None = None,
+    tilt: float = TILT,
     margin: float = 0.0,
     seed: int = 0,
     path_margin: float = PATH_MARGIN,
@@ -103,6 +113,9 @@ def plan_motion(
         through: way points: configurations and poses that it passes one after another without a
             stop; none where the goal is a `Line`, or the guide's ways are not proved clear.
         blend: how far off each joint may be where it passes one [rad or m], at least 0.01.
+        upright: name of a frame, of which what points up at the start stays up on the way; it is
+            led by a search of its own, in place of the guides "auto" and "path".
+        tilt: how far it may tilt [rad], 0.01 to π/2.
         margin: safety margin m [m]; it must hold at start and goal too.
         seed: of the guide's random choices.
         path_margin: distance that paths keep beyond m [m].
@@ -120,19 +133,17 @@ def plan_motion(
         InvalidValueError: no configuration, an unknown guide, or a value out of its range.
     """
     legs, line = _legs(world, margin, density, alpha, kappa, sensing), None
-
-    def planned_to(q: ArrayLike, goal: Goal) -> PlannedPath:
-        return _planned(legs, q, goal, guide, seed, path_margin, search)
-
     if isinstance(goal, Line):
-        if through is not None:
-            raise InvalidValueError("through", through, "left out where the goal is a Line")
+        for name, value in (("through", through), ("upright", upright)):
+            if value is not None:
+                raise InvalidValueError(name, value, "left out where the goal is a Line")
         planned, line = _straight(legs.check, start, goal, path_margin)
-    elif through is not None:
-        ways = goal_list(world.arm, through, "way point")
-        planned = planned_through(legs.check, start, ways, goal, blend, seed, planned_to)
     else:
-        planned = planned_to(start, goal)
+        level = None
+        if upright is not None:
+            q = world.arm.check_configuration("start", start)
+            level = Upright.from_start(world.arm, q, upright, tilt)
+        planned = _way(legs, start, goal, guide, seed, path_margin, search, through, blend, level)
     points, kept = planned.path.waypoints, planned.kept
     stuck, remark = "", planned.path.remark
     if not planned.path.is_clear:
@@ -149,6 +160,7 @@ def plan_motion(
         path=planned.path,
         goal=planned.goal,
         way_points=planned.way_points,
+        upright=planned.upright,
         plan_time=planned.plan_time,
         detail=stuck,
         remark=remark,
@@ -192,6 +204,38 @@ def _legs(
 ) -> Legs:
     distance = TorusDistance(world.arm, density.weights, kappa)
     return Legs(SweptCheck(world, margin), distance, replace(density, alpha=alpha), sensing)
+
+
+def _way(
+    legs: Legs,
+    start: ArrayLike,
+    goal: Goal,
+    guide: str | Guide,
+    seed: int,
+    path_margin: float,
+    search: PlanningParameters,
+    through: Goal | None,
+    blend: float,
+    upright: Upright | None,
+) -> PlannedPath:
+    """Plan to a goal, by way points and upright where that is asked for."""
+    check, arm = legs.check, legs.check.arm
+    if upright is not None and guide not in ("auto", "path"):
+        raise InvalidValueError("guide", guide, "'auto' or 'path', where a frame is kept upright")
+
+    def plan(q: ArrayLike, goal: Goal) -> PlannedPath:
+        if upright is None:
+            return _planned(legs, q, goal, guide, seed, path_margin, search)
+        return planned_upright(check, q, goal, upright, path_margin, search, seed)
+
+    def freedom(kept: Array) -> FreeSpace:
+        planes = SeparatingPlanes(check.world, check.margin, kept)
+        return planes if upright is None else UprightSpace(arm, planes, upright)
+
+    if through is None:
+        return plan(start, goal)
+    ways = goal_list(arm, through, "way point")
+    return planned_through(arm, start, ways, goal, blend, seed, plan, freedom)
 
 
 def _planned(
@@ -268,7 +312,10 @@ def _planned_to(
         return PlannedPath(path, kept, time.perf_counter() - began, goal, cost)
 
     if not isinstance(guide, str):
-        path = _checked(arm, guide.plan(depart, arrive, seed), depart, arrive)
+        answer = guide.plan(depart, arrive, seed)
+        if isinstance(answer, NoPath):
+            raise PlanningError(Outcome.NO_PATH, answer.reason)
+        path = checked_path(arm, answer, depart, arrive)
         if path.is_clear:
             kept = kept_along(check, path.waypoints, kept)
         return found(path, kept)
@@ -323,27 +370,6 @@ def _searched(
     raise PlanningError(Outcome.NO_PATH, f"{reason}, with margins of {tried} mm")
 
 
-def _checked(arm: Arm, answer: object, start: Array, goal: Array) -> GuidePath:
-    """Return the path that somebody's own guide found, once it is known to be one."""
-    if isinstance(answer, NoPath):
-        raise PlanningError(Outcome.NO_PATH, answer.reason)
-    if not isinstance(answer, GuidePath):
-        raise InvalidValueError("answer of the guide", answer, "a GuidePath or a NoPath")
-    what, allowed = "waypoints of the guide", f"of shape (W, {arm.nq}), W >= 2"
-    try:
-        points = np.asarray(answer.waypoints, dtype=np.float64)
-    except (TypeError, ValueError):  # no numbers, or rows of different lengths
-        raise InvalidValueError(what, answer.waypoints, allowed) from None
-    if points.ndim != 2 or len(points) < 2 or points.shape[1] != arm.nq:
-        raise InvalidValueError(what, answer.waypoints, f"{allowed}, got {points.shape}")
-    checked = [arm.check_configuration("waypoint of the guide", point) for point in points]
-    for name, at, q in (("first", 0, start), ("last", -1, goal)):
-        if np.abs(arm.difference(q, checked[at])).max() > LIMIT_INSET:
-            allowed = f"the {'start' if at == 0 else 'goal'} {q.tolist()}"
-            raise InvalidValueError(f"{name} waypoint of the guide", checked[at], allowed)
-    return GuidePath(np.array(checked), bool(answer.is_clear))
-
-
 def _timed(
     world: World,
     margin: float,
@@ -368,8 +394,8 @@ def _timed(
 
     path, passed = None, planned.way_points
     if planned.is_rounded:
-        path = blended_path(world, margin, curve, kept, way_points=passed)
-    if path is None and passed is None:
+        path = blended_path(world, margin, curve, kept, way_points=passed, upright=planned.upright)
+    if path is None and passed is None and planned.upright is None:
         path = smooth_path(world, margin, curve, kept, line)
     if path is None:
         near = (

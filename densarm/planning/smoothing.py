@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from densarm.arms.arm import Arm
 from densarm.arms.line import Segment
+from densarm.arms.upright import Upright
 from densarm.planning.guide import WayPoints
 from densarm.values.arrays import Array
 from densarm.world.separating_planes import SeparatingPlanes, configuration_tube
@@ -24,6 +25,8 @@ _HALVINGS = 9
 _SAMPLE = 0.01  # [rad] at most between the samples that the proof uses at first
 _PARTS = 4  # at least, that each polynomial piece is sampled in
 _LARGEST_GROUP = 64  # chords that are proved at once
+_UPRIGHT_PARTS = 64  # of each piece, between which a tilt is bounded
+_UPRIGHT_SHARE = 0.9  # of its angle; the rest is for tracking errors
 _DOUBLINGS = 5  # of the samples; the spline's departure from its chords falls with their square
 
 
@@ -108,12 +111,13 @@ def blended_path(
     kept: float | Array = 0.0,
     widest: float = _WIDEST,
     way_points: WayPoints | None = None,
+    upright: Upright | None = None,
 ) -> SmoothPath | None:
     """Return a C² path as `smooth_path` does, which blends corners as widely as is clear.
 
-    The knots of its spline get denser only where it is not proved clear, or does not pass a way
-    point, and control points are those of the polyline at averages of three knots, so that it goes
-    along straight segments at an even rate: both let a motion be quicker.
+    The knots of its spline get denser only where it is not proved clear, misses a way point or
+    tilts a frame, and control points are those of the polyline at averages of three knots, so that
+    it goes along straight segments at an even rate: both let a motion be quicker.
 
     Args:
         world: the arm among obstacles.
@@ -122,6 +126,7 @@ def blended_path(
         kept: what each pair, or all, keep beyond the margin (K,) [m].
         widest: distance between knots at first, on the polyline [rad or m].
         way_points: what the polyline passes, and the path as it does.
+        upright: what it keeps upright within nine tenths of its angle, as the polyline does.
 
     Source: I. J. Schoenberg, On Spline Functions, 1967, for the control points.
     """
@@ -138,6 +143,8 @@ def blended_path(
             path = _passing(path, passed / length[-1], corner[way_points.rows])
             missed = passed[_misses(world.arm, path, passed / length[-1], way_points)]
         halved = ~np.fromiter(_clear_pieces(proof, path, length[-1]), dtype=np.bool_)
+        if upright is not None:
+            halved |= ~np.fromiter(_upright_pieces(world.arm, path, upright), dtype=np.bool_)
         for at in missed:
             halved |= (breaks[:-1] <= at) & (at <= breaks[1:])
         if not halved.any():
@@ -183,6 +190,16 @@ def _is_straight(world: World, path: SmoothPath, line: Segment | None) -> bool:
     s = np.linspace(0.0, 1.0, 10 * len(path.knots))
     off = line.off(world.arm, world.arm.configurations(path(s)))
     return all(bool((far <= most).all()) for far, most in zip(off, STRAIGHT, strict=True))
+
+
+def _upright_pieces(arm: Arm, path: SmoothPath, upright: Upright) -> Iterator[bool]:
+    """Yield of each polynomial piece if it is proved to keep a frame upright."""
+    for begin, end in pairwise(np.unique(path.knots)):
+        s = np.linspace(begin, end, _UPRIGHT_PARTS + 1)
+        curvature = np.abs(path(s, 2))
+        off = np.maximum(curvature[:-1], curvature[1:]) / 8.0 * np.diff(s)[:, np.newaxis] ** 2
+        largest = upright.largest_tilts(arm, arm.configurations(path(s)), off)
+        yield bool((largest <= _UPRIGHT_SHARE * upright.within).all())
 
 
 def _clear_pieces(proof: "_MotionProof", path: SmoothPath, length: float) -> Iterator[bool]:

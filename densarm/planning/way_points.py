@@ -6,17 +6,16 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from densarm.arms.arm import Arm
 from densarm.arms.pose import Pose
 from densarm.density.sub_goals import GuidePath
 from densarm.errors import InvalidValueError
 from densarm.planning.goals import Goal, way_cost
-from densarm.planning.guide import PlannedPath, WayPoints
+from densarm.planning.guide import FreeSpace, PlannedPath, WayPoints
 from densarm.planning.motion import PlanningError
 from densarm.planning.rounding import rounded_through
 from densarm.values.arrays import Array
 from densarm.values.checks import finite_number
-from densarm.world.separating_planes import SeparatingPlanes
-from densarm.world.swept_check import SweptCheck
 
 BLEND = 0.05
 """How far off each joint may be by default where a way point is passed [rad or m]."""
@@ -39,18 +38,19 @@ def checked_blend(blend: float) -> float:
 
 
 def planned_through(
-    check: SweptCheck,
+    arm: Arm,
     start: ArrayLike,
     through: Sequence[Array | Pose],
     goal: Goal,
     blend: float,
     seed: int,
     plan: Callable[[ArrayLike, Goal], PlannedPath],
+    freedom: Callable[[Array], FreeSpace],
 ) -> PlannedPath:
     """Plan from one way point to the next, and return all of it as one path, rounded.
 
     Args:
-        check: the world and the safety margin.
+        arm: the arm.
         start: configuration (nq,).
         through: way points; of a pose, the configuration that is taken leads on from the one
             before.
@@ -58,12 +58,13 @@ def planned_through(
         blend: how far off each joint may be at way points [rad or m].
         seed: of the rounding.
         plan: plans from a configuration (nq,) to a goal.
+        freedom: what proves that pairs keep distances (K,) [m].
 
     Raises:
         PlanningError: there is no way from one to the next.
         InvalidValueError: a guide whose ways are not proved clear.
     """
-    began, arm, q = time.perf_counter(), check.arm, start
+    began, q = time.perf_counter(), start
     checked_blend(blend)
     legs = list[PlannedPath]()
     for k, target in enumerate([*through, goal], start=1):
@@ -79,7 +80,7 @@ def planned_through(
         q = leg.goal
     points, rows = _joined([leg.path.waypoints for leg in legs])
     kept = np.min([leg.kept for leg in legs], axis=0)
-    space, rng = SeparatingPlanes(check.world, check.margin, kept), np.random.default_rng(seed)
+    space, rng = freedom(kept), np.random.default_rng(seed)
     passed = WayPoints(np.stack([leg.goal for leg in legs[:-1]]), blend, rows)
     points, passed = rounded_through(arm, space, points, passed, _BENDS, rng)
     told = {
@@ -94,6 +95,7 @@ def planned_through(
         way_cost(arm, points),
         is_rounded=True,
         way_points=passed,
+        upright=legs[-1].upright,
     )
 
 

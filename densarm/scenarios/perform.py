@@ -13,7 +13,7 @@ from densarm.arms.arm import Arm
 from densarm.arms.joints import with_moving, without_mimics
 from densarm.arms.line import Line
 from densarm.arms.models import frame_index
-from densarm.certificates.phases import LINE, WAY_POINTS, body_poses, positions_of
+from densarm.certificates.phases import LINE, UPRIGHT, WAY_POINTS, body_poses, positions_of
 from densarm.certificates.task import Task
 from densarm.control.tracking import DensityTracking
 from densarm.density.goal_distance import TorusDistance
@@ -207,10 +207,7 @@ class _Cell:
         controller = DensityTracking(world, motion, goal_distance=distance, **law)
         prepared = time.perf_counter() - began
         told = Disturbances() if isinstance(step, Grip) else self._scenario.disturbances
-        task = replace(task, goal=motion.goal)
-        if (passed := motion.way_points) is not None:
-            says = {"positions": arm.angles(passed.q).tolist(), "blend": passed.blend}
-            task = replace(task, settings={**task.settings, WAY_POINTS: says})
+        task = replace(task, goal=motion.goal, settings={**task.settings, **_said(arm, motion)})
         done = simulate_task(task, world, controller, None, told, self._on_progress)
         self._leave(done)
         path = motion.path or GuidePath(motion.position, is_clear=True)
@@ -231,7 +228,8 @@ class _Cell:
             goal = step
         elif isinstance(step, MoveTo):
             goal, passed_over = self._goals(k, world, step.goal)
-            options |= {"through": step.through, "blend": step.blend}
+            own = ("through", "blend", "upright", "tilt")
+            options |= {key: getattr(step, key) for key in own}
         elif isinstance(step, Grip):
             positions = gripper_positions(scenario.arm.description, step)
             goal = world.arm.configuration([positions[name] for name in world.arm.joint_names])
@@ -342,6 +340,16 @@ def _fault_on(q: Array, lines: Iterable[tuple[Line, SweptCheck]]) -> str:
     except PlanningError as error:
         return error.detail
     return ""
+
+
+def _said(arm: Arm, motion: Motion) -> dict[str, Any]:
+    """Return what a phase says of its motion beside its goal."""
+    said = dict[str, Any]()
+    if (passed := motion.way_points) is not None:
+        said[WAY_POINTS] = {"positions": arm.angles(passed.q).tolist(), "blend": passed.blend}
+    if motion.upright is not None:
+        said[UPRIGHT] = motion.upright.to_json()
+    return said
 
 
 def _placed(body: Obstacle, pose: pin.SE3) -> Obstacle:

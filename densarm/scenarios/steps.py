@@ -10,6 +10,7 @@ from densarm.arms.joints import followed, without_mimics
 from densarm.arms.line import Line
 from densarm.arms.models import frame_index
 from densarm.arms.pose import Pose
+from densarm.arms.upright import TILT, checked_tilt
 from densarm.errors import InvalidValueError, UnknownNameError
 from densarm.planning.goals import Goal, goal_list
 from densarm.planning.way_points import BLEND, checked_blend
@@ -27,7 +28,7 @@ class MoveTo:
     """Go to a goal, and of several to one from which the lines that follow can be gone.
 
     Raises:
-        InvalidValueError: a blend that is not a number >= 0.01.
+        InvalidValueError: a blend or tilt that is not a number in its range.
     """
 
     goal: Goal
@@ -36,9 +37,14 @@ class MoveTo:
     """Way points: configurations and poses that it passes one after another without a stop."""
     blend: float = BLEND
     """How far off each joint may be where it passes one, at least 0.01 [rad or m]."""
+    upright: str | None = None
+    """Name of a frame, of which what points up at the start stays up on the way."""
+    tilt: float = TILT
+    """How far that may tilt, 0.01 to π/2 [rad]."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "blend", checked_blend(self.blend))
+        object.__setattr__(self, "tilt", checked_tilt(self.tilt))
 
     def __str__(self) -> str:
         passing = "" if self.through is None else ", through way points"
@@ -184,7 +190,7 @@ def _move(arm: Arm, name: str, table: "_MoveTable") -> MoveTo:
     goal, through = read_goal(arm, f"{name}.move_to", table.move_to), None
     if table.through is not None:
         through = read_goal(arm, f"{name}.through", table.through)
-    return MoveTo(goal, through, table.blend)
+    return MoveTo(goal, through, table.blend, table.upright, table.tilt)
 
 
 _KEYS = ("move_to", "line", "grip", "attach", "detach", "wait")
@@ -195,6 +201,8 @@ class _MoveTable:
     move_to: Any
     through: Any = None
     blend: float = BLEND
+    upright: str | None = None
+    tilt: float = TILT
 
 
 @dataclass(frozen=True)
@@ -228,13 +236,18 @@ def check_steps(arm: Arm, scene: Scene, steps: Sequence[Step]) -> None:
         if isinstance(step, Grip):
             gripper_positions(arm.description, step)
         if isinstance(step, MoveTo):
-            ways = [] if step.through is None else goal_list(arm, step.through, f"{name}.through")
-            for goal in [*goal_list(arm, step.goal, name), *ways]:
-                if isinstance(goal, Pose):
-                    frame_index(arm.model, goal.frame, f"frame of {name}")
+            _check_move(arm, name, step)
     if isinstance(steps[-1], Attach | Detach):
         allowed = "one that takes time, a retreat or a wait, so that what it leaves is recorded"
         raise InvalidValueError("last of steps", str(steps[-1]), allowed)
+
+
+def _check_move(arm: Arm, name: str, step: MoveTo) -> None:
+    ways = [] if step.through is None else goal_list(arm, step.through, f"{name}.through")
+    poses = [x for x in (*goal_list(arm, step.goal, name), *ways) if isinstance(x, Pose)]
+    for frame in [*(pose.frame for pose in poses), step.upright]:
+        if frame is not None:
+            frame_index(arm.model, frame, f"frame of {name}")
 
 
 def _exchange(

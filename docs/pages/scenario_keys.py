@@ -13,6 +13,7 @@ import numpy as np
 from densarm.arms.arm import load_arm
 from densarm.arms.line import Line
 from densarm.arms.pose import Pose
+from densarm.arms.upright import TILT
 from densarm.control.tracking import TRACKING_GAINS
 from densarm.planning.way_points import BLEND
 from densarm.scenarios import scenario
@@ -69,6 +70,8 @@ _STEPS = [  # one of them in each table, and what a move has besides
     Key("move_to", "as a goal", "–", "Where to go, as [task] goal."),
     Key("through", "as a goal", "–", "Beside `move_to`: way points, in their order, as goals are."),
     Key("blend", "number", f"{BLEND:g}", "Beside it: how far off each joint may be at these."),
+    Key("upright", "text", "–", "Beside it: a frame, of which what points up stays up on the way."),
+    Key("tilt", "number", f"{TILT:g}", "Beside it: how far that may tilt [rad]."),
     Key("line", "table", "–", "A straight way of a frame, below."),
     Key("grip", "table", "–", "Position of each joint of a gripper [rad or m], by its name."),
     Key("attach", "table", "–", "A body that is taken, below."),

@@ -10,8 +10,9 @@ import pytest
 
 import densarm
 from densarm.arms.arm import Arm
+from densarm.arms.upright import Upright
 from densarm.certificates.certificate import Certificate
-from densarm.certificates.phases import LINE, WAY_POINTS, Phase, certify_phases
+from densarm.certificates.phases import LINE, UPRIGHT, WAY_POINTS, Phase, certify_phases
 from densarm.errors import FileContentError
 from densarm.scene.scene import Scene
 from densarm.simulation.run import Run
@@ -144,6 +145,22 @@ def test_way_points_that_are_passed_otherwise(phases: list[Phase]) -> None:
     assert certify_phases(told([300, 600], 0.005)).certified
     assert failing(told([600, 300], 0.0)) == ["way points"]
     assert failing(told([300], 0.03)) == ["way points"]
+
+
+def test_a_frame_that_tilts_farther_than_it_may(phases: list[Phase]) -> None:
+    arm, q = phases[0].task.arm, phases[0].q
+    upright = Upright.from_start(arm, q[0], "panda_hand_tcp", 0.1)
+    tilt = float(upright.tilts(arm, q).max())
+
+    def told(within: float) -> list[Phase]:
+        said = {UPRIGHT: upright._replace(within=within).to_json()}
+        task = replace(phases[0].task, settings={**phases[0].task.settings, **said})
+        return [phases[0]._replace(task=task), *phases[1:]]
+
+    assert 0.02 < tilt < 1.5
+    assert certify_phases(told(tilt + 0.01)).certified
+    assert failing(told(tilt)) == ["upright"]  # which it may exceed between samples
+    assert failing(told(0.5 * tilt)) == ["upright"]
 
 
 def test_a_body_that_may_touch_does_not_enter(phases: list[Phase]) -> None:

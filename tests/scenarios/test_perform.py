@@ -33,7 +33,9 @@ def test_a_can_is_carried_and_all_of_it_certified(carried_can: Run) -> None:
     end = body_poses(run.phases[-1].task, run.phases[-1].q[-1])["can"][1].translation
     assert end == pytest.approx([0.5, 0.1, 0.18], abs=5e-4)
     by_name = {check.name: check for check in run.certificate.checks}
-    assert all(by_name[name].holds for name in ("joined", "held", "line", "support", "swept"))
+    assert all(
+        by_name[name].holds for name in ("joined", "held", "line", "upright", "support", "swept")
+    )
     assert "can and table (phase 4); can and table (phase 6)" in by_name["support"].detail
 
 

@@ -64,6 +64,10 @@ def test_way_points_are_told_beside_a_move(tmp_path: Path) -> None:
     assert posture == pytest.approx(densarm.load_arm("panda").postures["ready"])
     assert pose == densarm.Pose(TCP, [0.5, 0.0, 0.4])
     assert (plain.blend, wide.blend) == (0.05, 0.1)
+    assert plain.upright is None
+    (level,) = load(tmp_path, f'move_to = "ready"\nupright = "{TCP}"\ntilt = 0.2').steps
+    assert isinstance(level, densarm.MoveTo)
+    assert (level.upright, level.tilt) == (TCP, 0.2)
     assert str(plain) == "move to a goal, through way points"
 
 
@@ -86,6 +90,8 @@ def test_a_body_may_touch_its_support_in_the_line_beside_alone() -> None:
         (['line = { frame = "tcp", by = [0, 0, 1] }'], "unknown frame of steps[0] 'tcp'"),
         (['move_to = "ready"\nthrough = "redy"'], "unknown posture for steps[0].through 'redy'"),
         (['move_to = "ready"\nblend = 0'], "steps[0].blend = 0.0: must be at least 0.01 rad or m"),
+        (['move_to = "ready"\nupright = "tcp"'], "unknown frame of steps[0] 'tcp'"),
+        (['move_to = "ready"\ntilt = 5'], "steps[0].tilt = 5.0: must be from 0.01 to π/2 rad"),
         (['move_to = "ready"\nwait = 1'], "unknown key of [steps[0]] 'wait'"),
         (
             ['move_to = "ready"\nthrough = { frame = "tcp", position = [0, 0, 1] }'],
