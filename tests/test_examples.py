@@ -313,4 +313,4 @@ def test_way_points(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixtu
     assert reached.startswith("reached after 1.")
     assert reached.endswith("certified: True")
     assert float(passes.split()[-2]) > 0.5
-    assert proved.startswith("2 passed in their order within their blends")
+    assert proved.startswith("2 passed in their order, each joint within 0.0")

@@ -1,6 +1,6 @@
 """Certificate of a run of several phases: each by itself, and how one goes on from another."""
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 from itertools import pairwise
 from typing import Any, NamedTuple
@@ -41,9 +41,38 @@ WAY_POINTS = "way_points"
 UPRIGHT = "upright"
 """Key of a task's settings: the frame that a phase says it keeps upright, and within what angle."""
 
-_NONE: Mapping[str, Any] = {"positions": (), "blend": 1.0}
 _SAME = 1e-9  # [rad, m], room for rounding
 _FAR = 1e3  # [m] that pairs which are not asked for keep beyond all distances
+
+
+class Claims(NamedTuple):
+    """What a task says of its motion beside start and goal; None of what it does not say."""
+
+    line: Segment | None
+    """The line that it leads a frame along."""
+    positions: Array
+    """The joint positions that it passes (M, nv) [rad or m]."""
+    blend: float
+    """How far off each joint may be there [rad or m]."""
+    upright: Upright | None
+    """What it keeps upright."""
+
+
+def claims_of(task: Task) -> Claims:
+    """Return what the settings of a task claim.
+
+    Raises:
+        KeyError, TypeError, ValueError: other data than it would have been written.
+    """
+    said, nv = task.settings, task.arm.nv
+    passed = said.get(WAY_POINTS, {"positions": [], "blend": 0.0})
+    positions = np.array(passed["positions"], np.float64).reshape(-1, nv)
+    return Claims(
+        Segment.from_json(said[LINE]) if LINE in said else None,
+        positions,
+        float(passed["blend"]),
+        Upright.from_json(said[UPRIGHT]) if UPRIGHT in said else None,
+    )
 
 
 class Phase(NamedTuple):
@@ -207,8 +236,8 @@ def _shape(body: Obstacle) -> Obstacle:
 def _line(phases: Sequence[Phase]) -> Check:
     worst, at, count, before = 0.0, 0.0, 0, 0.0
     for k, phase in enumerate(phases, start=1):
-        if LINE in phase.task.settings:
-            segment, arm = Segment.from_json(phase.task.settings[LINE]), phase.task.arm
+        if (segment := claims_of(phase.task).line) is not None:
+            arm = phase.task.arm
             far, turned = segment.off(arm, phase.q)
             far, count = far + _between(arm, segment.frame, phase), count + 1
             share = np.maximum(far / LINE_TOLERANCE[0], turned / LINE_TOLERANCE[1])
@@ -245,11 +274,11 @@ def _between(arm: Arm, frame: str, phase: Phase) -> float:
 
 def _way_points(phases: Sequence[Phase]) -> Check:
     """Prove that way points are passed in their order: by samples, each after the last one's."""
-    name, worst, at, count, before = "way points", 0.0, 0.0, 0, 0.0
+    name, worst, at, count, widest, before = "way points", 0.0, 0.0, 0, 0.0, 0.0
     for k, phase in enumerate(phases, start=1):
-        said, arm, row = phase.task.settings.get(WAY_POINTS, _NONE), phase.task.arm, 0
-        blend = float(said["blend"])
-        for n, angles in enumerate(said["positions"], start=1):
+        said, arm, row = claims_of(phase.task), phase.task.arm, 0
+        blend = said.blend
+        for n, angles in enumerate(said.positions, start=1):
             off = np.abs(arm.difference(arm.configuration(angles), phase.q[row:])).max(axis=1)
             nearest = int(off.argmin())
             time = before + (row + nearest) * phase.task.simulation.dt
@@ -259,18 +288,20 @@ def _way_points(phases: Sequence[Phase]) -> Check:
             if (share := float(off[nearest] / blend)) >= worst:
                 worst, at = share, time
             row, count = row + int((off <= blend).argmax()), count + 1
+            widest = max(widest, blend)
         before += phase.duration
     if not count:
         return Check(name, None, "does not apply: no phase passes any", None, 0.0)
-    detail = f"{count} passed in their order within their blends, of which {worst:.0%} used"
+    within = f"each joint within {widest:.3g}"
+    detail = f"{count} passed in their order, {within}, of which {worst:.0%} used"
     return Check(name, True, f"{detail} at t = {at:.3f} s", 1.0 - worst, at)
 
 
 def _upright(phases: Sequence[Phase]) -> Check:
-    worst, at, count, before = 0.0, 0.0, 0, 0.0
+    worst, at, count, widest, before = 0.0, 0.0, 0, 0.0, 0.0
     for k, phase in enumerate(phases, start=1):
-        if UPRIGHT in phase.task.settings:
-            upright, dt = Upright.from_json(phase.task.settings[UPRIGHT]), phase.task.simulation.dt
+        if (upright := claims_of(phase.task).upright) is not None:
+            dt = phase.task.simulation.dt
             arm, q, off = phase.task.arm, phase.q, departure(phase.v, dt)
             bounds = np.append(upright.tilts(arm, q[:1]), upright.largest_tilts(arm, q, off))
             row, count = max(int(bounds.argmax()) - 1, 0), count + 1
@@ -278,13 +309,14 @@ def _upright(phases: Sequence[Phase]) -> Check:
             if not most <= upright.within:
                 far = f"{upright.frame!r} may tilt by {most:.3g} rad, not {upright.within:.3g}"
                 return Check("upright", False, f"phase {k} ({phase.task.title}): {far}", None, time)
+            widest = max(widest, upright.within)
             if most / upright.within >= worst:
                 worst, at = most / upright.within, time
         before += phase.duration
     if not count:
         return Check("upright", None, "does not apply: nothing is kept upright", None, 0.0)
-    detail = f"{count} phases keep a frame upright, {worst:.0%} of the angle used at t = {at:.3f} s"
-    return Check("upright", True, detail, 1.0 - worst, at)
+    detail = f"{count} phases keep a frame within {widest:.3g} rad, of which {worst:.0%} used"
+    return Check("upright", True, f"{detail} at t = {at:.3f} s", 1.0 - worst, at)
 
 
 def _support(phases: Sequence[Phase]) -> Check:

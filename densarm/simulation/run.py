@@ -12,7 +12,7 @@ from zipfile import BadZipFile, ZipFile, is_zipfile
 import numpy as np
 
 from densarm.certificates.certificate import Certificate, certify
-from densarm.certificates.phases import Phase, certify_phases, positions_of, values_of
+from densarm.certificates.phases import Phase, certify_phases, claims_of, positions_of, values_of
 from densarm.certificates.task import Input, Task
 from densarm.errors import DensarmError, FileContentError, InvalidValueError
 from densarm.simulation.disturbances import Disturbances
@@ -303,6 +303,7 @@ class Run:
     def _checked(self) -> "Run":
         n, arm = len(self.time), self.task.arm
         parse_table("disturbances", Disturbances, self.task.disturbances)
+        claims_of(self.task)
         shapes = {"time": (n,), "q": (n, arm.nq), "v": (n, arm.nv), "tau": (n, arm.nv)}
         shapes |= {"clearance": (n,), "reference": (n, arm.nv), "tube": (arm.nv,)}
         for name, shape in shapes.items():

@@ -163,6 +163,25 @@ def test_a_frame_that_tilts_farther_than_it_may(phases: list[Phase]) -> None:
     assert failing(told(0.5 * tilt)) == ["upright"]
 
 
+@pytest.mark.parametrize(
+    "said",
+    [
+        {LINE: 5},
+        {WAY_POINTS: {"positions": [[0.0]], "blend": 0.1}},
+        {WAY_POINTS: {"positions": []}},
+        {UPRIGHT: {"frame": "panda_hand", "within": 0.1}},
+    ],
+)
+def test_claims_that_are_none_make_no_run(
+    said: dict[str, Any], carried_can: Run, tmp_path: Path
+) -> None:
+    first = carried_can.phases[0]
+    task = replace(first.task, settings={**first.task.settings, **said})
+    replace(first, task=task).save(tmp_path / "run.npz")
+    with pytest.raises(FileContentError, match="not a run"):
+        Run.load(tmp_path / "run.npz")
+
+
 def test_a_body_that_may_touch_does_not_enter(phases: list[Phase]) -> None:
     """The table is 2 mm higher in all phases, so that it stands in the can."""
     assert failing([moved(phase, "table", 0.002) for phase in phases]) == ["support"]

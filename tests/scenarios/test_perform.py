@@ -99,7 +99,7 @@ def test_a_move_passes_its_way_points(can_on_a_table: World, tmp_path: Path) -> 
     assert (run.outcome, run.certified) == (Outcome.REACHED, True), run.detail
     run.save(tmp_path / "run.npz")
     by_name = {check.name: check for check in Run.load(tmp_path / "run.npz").certificate.checks}
-    assert by_name["way points"].detail.startswith("2 passed in their order within their blends")
+    assert by_name["way points"].detail.startswith("2 passed in their order, each joint within 0.0")
     q, v = run.phases[0].q, run.phases[0].v
     nearest = np.abs(arm.difference(raised, q)).max(axis=1).argmin()
     assert np.abs(v[nearest]).max() > 0.2
