@@ -10,7 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from densarm.arms.arm import Arm, load_arm
-from densarm.planning.rounding import rounded, way_time
+from densarm.planning.guide import WayPoints
+from densarm.planning.rounding import rounded, rounded_through, way_time
 
 Discs = Callable[..., Any]
 
@@ -28,6 +29,19 @@ def test_a_detour_gets_quicker_and_stays_clear(seed: int, arm: Arm, make_discs: 
     assert way_time(arm, way) < 0.8 * way_time(arm, path)
     again = rounded(arm, discs, path, 500, np.random.default_rng(seed))
     np.testing.assert_array_equal(again, way)
+
+
+@pytest.mark.parametrize("within", [0.0, 0.1])
+def test_what_is_passed_stays_where_it_may(within: float, arm: Arm, make_discs: Discs) -> None:
+    discs, rng = make_discs(arm, (0.0, 0.0, 0.8)), np.random.default_rng(0)
+    path = np.stack([arm.configuration(corner) for corner in DETOUR])
+    asked = WayPoints(path[[1, 2]], within / 0.8, np.array([1, 2]))
+    way, passed = rounded_through(arm, discs, path, asked, 500, rng)
+    off = np.abs(arm.difference(path[[1, 2]], way[passed.rows])).max(axis=1)
+    assert (off <= within + 1e-12).all()
+    assert (passed.rows < 0).all()
+    assert all(discs.segment_is_clear(a, b) for a, b in pairwise(way))
+    assert way_time(arm, way) <= way_time(arm, path) + 1e-9
 
 
 def test_what_is_blocked_all_around_stays(arm: Arm) -> None:
