@@ -4,6 +4,7 @@ import os
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Callable, Sequence
 from copy import copy, deepcopy
+from functools import lru_cache
 from pathlib import Path
 from typing import TypeVar
 
@@ -18,14 +19,11 @@ from densarm.arms.description import (
 )
 from densarm.errors import DensarmError, InvalidValueError, RobotDescriptionError
 from densarm.scene.mesh_file import read_mesh
-from densarm.values.arrays import Array
+from densarm.values.arrays import Array, Vector
 from densarm.values.checks import finite_vector
 from densarm.values.files import captured_stderr
 
 T = TypeVar("T")
-
-# Reads a file again once it has changed.
-_MESHES = coal.CachedMeshLoader(coal.BV_OBB)
 
 _ELEMENTS = ("collision", "visual")
 _SIZES = ("size", "radius", "length", "scale")
@@ -92,8 +90,9 @@ class Urdf:
                 "name the folders that hold its package as package_dirs"
             )
         try:
-            item.meshScale = _scale(mesh.get("scale", "1 1 1"))
-            item.geometry, item.meshPath = read_mesh(file, item.meshScale, _MESHES), str(file)
+            scale, status = _scale(mesh.get("scale", "1 1 1")), file.stat()
+            item.meshScale, item.meshPath = scale, str(file)
+            item.geometry = _kept_mesh(file, tuple(scale), status.st_mtime_ns, status.st_size)
         except DensarmError as error:
             raise RobotDescriptionError(f"URDF: mesh {name!r} of link {link!r}: {error}") from None
 
@@ -106,6 +105,14 @@ class Urdf:
 
     def _text(self) -> str:
         return ElementTree.tostring(self.root, encoding="unicode")
+
+
+# coal's CachedMeshLoader reads each file every time, and arms of one robot are made again and again
+# where what they hold changes.
+@lru_cache(maxsize=512)
+def _kept_mesh(path: Path, scale: Vector, _changed: int, _size: int) -> coal.BVHModelBase:
+    """Return the triangles of a mesh file, read again once it has changed."""
+    return read_mesh(path, scale)
 
 
 def _collide_as_drawn(link: ElementTree.Element, which: str) -> None:

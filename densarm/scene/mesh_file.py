@@ -26,7 +26,7 @@ _STL_HEADER, _STL_FACET = 84, 50  # [bytes], of a binary file
 _LOADER = coal.MeshLoader(coal.BV_OBB)  # the cheapest tree whose vertices Python can read
 
 
-def read_mesh(path: Path, scale: Vector, loader: coal.MeshLoader = _LOADER) -> coal.BVHModelBase:
+def read_mesh(path: Path, scale: Vector) -> coal.BVHModelBase:
     """Return the triangles of a mesh file [m].
 
     The unit of a DAE file (Collada) is applied, and its ``up_axis`` is not: RViz has it so, and
@@ -37,7 +37,6 @@ def read_mesh(path: Path, scale: Vector, loader: coal.MeshLoader = _LOADER) -> c
     Args:
         path: an STL, OBJ or DAE file.
         scale: factors x y z from the file's unit to metres; a negative one mirrors.
-        loader: what reads it; by default one that forgets it again.
 
     Raises:
         FileContentError: no such file, another format, too large, no mesh, or a unit that is none.
@@ -61,7 +60,7 @@ def read_mesh(path: Path, scale: Vector, loader: coal.MeshLoader = _LOADER) -> c
         with captured_stderr(_COAL_MESSAGES):
             if capitals:
                 return _in_small_letters(capitals, factors)
-            return loader.load(str(path), factors)
+            return _LOADER.load(str(path), factors)
     except FileContentError:
         raise
     except (ValueError, RuntimeError, OSError):

@@ -1,6 +1,7 @@
 """Arms by name and from URDF files: joints, limits, postures, locked joints, base placement."""
 
 import json
+import os
 import re
 import shutil
 from dataclasses import replace
@@ -13,6 +14,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+import densarm.arms.urdf as urdf_to_models
 from densarm.arms.arm import Arm, load_arm
 from densarm.arms.description import RobotDescription, data_wheel_folder
 from densarm.errors import (
@@ -22,6 +24,7 @@ from densarm.errors import (
     RobotDescriptionError,
     UnknownNameError,
 )
+from densarm.scene.mesh_file import read_mesh
 from densarm.values.arrays import Array
 
 DATA = Path(__file__).parents[1] / "data"
@@ -168,6 +171,32 @@ def test_package_dirs(tmp_path: Path) -> None:
         load_arm(file)
     for folders in ([tmp_path / "elsewhere"], str(tmp_path / "elsewhere")):
         assert load_arm(file, package_dirs=folders).collision_model.ngeoms == 6
+
+
+def test_a_mesh_is_read_once_until_its_file_changes(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    read: list[str] = []
+
+    def told(path: Path, scale: Any) -> Any:
+        read.append(path.name)
+        return read_mesh(path, scale)
+
+    monkeypatch.setattr(urdf_to_models, "read_mesh", told)
+    shutil.copytree(DATA, tmp_path / "data")
+    file = tmp_path / "data" / "branching.urdf"
+    first, again = load_arm(file), load_arm(file)
+    assert 0 < len(read) == len(set(read))
+    mesh = next((tmp_path / "data").rglob(read[0]))
+    mesh.write_bytes(mesh.read_bytes())
+    os.utime(mesh, ns=(1, 1))
+    count, changed = len(read), load_arm(file)
+    assert read[count:] == read[:1]
+    for arm in (again, changed):
+        for one, other in zip(
+            first.collision_model.geometryObjects, arm.collision_model.geometryObjects, strict=True
+        ):
+            assert one.geometry == other.geometry
 
 
 def test_meshes_of_one_name_are_told_apart(tmp_path: Path) -> None:
