@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from densarm.values.arrays import Array
 from densarm.values.checks import finite_vector, positive_integer
-from densarm.values.kernels import compiled_part
+from densarm.values.kernels import compiled_lean_part
 
 
 class ConfigurationSpace(Protocol):
@@ -93,7 +93,7 @@ def sliding_joints(model: pin.Model) -> NDArray[np.bool_]:
     return np.array([joint_axis(model, joint)[1] for joint in range(1, model.njoints)])
 
 
-@compiled_part
+@compiled_lean_part
 def joint_error(q_goal: Array, q: Array, joint_index: NDArray[np.int64], out: Array) -> None:
     r"""Write the tangent-space error of each joint.
 
@@ -119,7 +119,7 @@ def joint_error(q_goal: Array, q: Array, joint_index: NDArray[np.int64], out: Ar
             out[i] = q[k] - q_goal[k]
 
 
-@compiled_part
+@compiled_lean_part
 def write_configuration(angles: Array, joint_index: NDArray[np.int64], out: Array) -> None:
     """Write the configuration (nq,) of joint positions (nv,) [rad or m] into `out`."""
     for i in range(angles.shape[0]):
@@ -130,7 +130,7 @@ def write_configuration(angles: Array, joint_index: NDArray[np.int64], out: Arra
             out[k] = angles[i]
 
 
-@compiled_part
+@compiled_lean_part
 def place_joints(
     parent: NDArray[np.int64],
     joints: Array,
@@ -171,7 +171,7 @@ def place_joints(
             row[i + 2] = c * d + s * (a * y - b * x) + along * z
 
 
-@compiled_part
+@compiled_lean_part
 def compose(outer: Array, inner: Array, out: Array) -> None:
     """Write a pose that is given in the frame of another, both rows of 12 or more numbers."""
     for r in range(3):

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from densarm.values.arrays import Array
-from densarm.values.kernels import compiled_beside, compiled_part
+from densarm.values.kernels import compiled_beside, compiled_lean_part
 
 _LEAF = 8  # points of a leaf at most
 
@@ -28,7 +28,7 @@ DEEPEST = 64
 """Nodes that wait at most in a search, of a tree of up to 2^60 points."""
 
 
-@compiled_part
+@compiled_lean_part
 def put_nearer_last(
     first: int,
     first_bound: float,
@@ -49,7 +49,7 @@ def put_nearer_last(
     return count + 2
 
 
-@compiled_part
+@compiled_lean_part
 def leaf_points(tree: PointTree, node: int) -> tuple[int, int]:
     """Return the first point of a node and that after the last; none of a node that is no leaf."""
     n, n_leaves = tree.points.shape[0], (tree.boxes.shape[0] + 1) // 2
@@ -89,7 +89,7 @@ def _order(points: Array, boxes: Array, depth: int) -> None:
             node += 1
 
 
-@compiled_part
+@compiled_lean_part
 def _split(points: Array, begin: int, end: int, middle: int, axis: int) -> None:
     """Reorder points from `begin` to `end` so that none before `middle` lies beyond one after it.
 

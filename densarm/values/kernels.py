@@ -4,6 +4,7 @@ import hashlib
 import time
 from collections.abc import Callable
 from contextlib import AbstractContextManager
+from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -26,7 +27,8 @@ _KERNELS_TEXT = _kernels_text()
 
 
 if TYPE_CHECKING:  # numba's stubs do not know the options
-    compiled = compiled_beside = compiled_part = numba.njit(cache=True, error_model="numpy")
+    compiled = compiled_beside = numba.njit(cache=True, error_model="numpy")
+    compiled_part = compiled_lean_part = compiled
 else:
 
     def compiled(function, **options):
@@ -47,10 +49,14 @@ else:
         """Compile a long kernel as `compiled` does, which lets other threads go on meanwhile."""
         return compiled(function, nogil=True)
 
-    compiled_part = numba.njit(error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)
+    _PART = {"error_model": "numpy", "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+    compiled_part = numba.njit(**_PART)
+    compiled_lean_part = numba.njit(**_PART, _nrt=False)
 """`compiled_part` is the decorator of functions that kernels alone call, and are compiled into.
 
 Without an entry from Python, and without a file of its own, a part takes less time to compile.
+`compiled_lean_part` is for those that make no arrays, nor call what does: without counting of
+references, an atomic operation each time that a row of an array is looked at, they take less time.
 """
 
 
@@ -80,14 +86,23 @@ def _type_of(argument: object) -> Any:
     if isinstance(argument, tuple):
         parts = [_type_of(part) for part in argument]
         return known.types.BaseTuple.from_types(parts, type(argument))
-    found = known.typeof(argument)
-    if not isinstance(argument, np.ndarray) or argument.ndim != 2:
-        return found
-    size = argument.itemsize
-    if argument.strides in ((size * argument.shape[1], size), (0, 0)):  # or new, and empty
-        return found.copy(layout="C")
-    by_columns = argument.flags.f_contiguous and argument.strides[0] == size
-    return found.copy(layout="F" if by_columns else "A")
+    if not isinstance(argument, np.ndarray):
+        return known.typeof(argument)
+    flags, size = argument.flags, argument.itemsize
+    is_c, is_f = flags.c_contiguous, flags.f_contiguous
+    if argument.ndim == 2:
+        is_c = argument.strides in ((size * argument.shape[1], size), (0, 0))  # or new, and empty
+        is_f = is_f and argument.strides[0] == size
+    layout = "C" if is_c else "F" if is_f else "A"
+    return _array_type(argument.dtype, argument.ndim, layout, flags.writeable)
+
+
+@cache
+def _array_type(dtype: np.dtype[Any], ndim: int, layout: str, is_writeable: bool) -> Any:
+    """Return numba's type of an array, which takes numba longer to find out each time."""
+    known: Any = numba
+    found = known.typeof(np.empty((0,) * ndim, dtype))
+    return found.copy(layout=layout, readonly=not is_writeable)
 
 
 any_vector = np.zeros(4)[::2]

@@ -18,7 +18,7 @@ from densarm.scene.point_cloud import PointCloud
 from densarm.scene.point_tree import PointTree
 from densarm.scene.shapes import box_hull, convex_hull, extreme_points
 from densarm.values.arrays import Array
-from densarm.values.kernels import compiled_part
+from densarm.values.kernels import compiled_lean_part
 from densarm.world.hulls import Neighbours, cover, edge_table, neighbours
 from densarm.world.simplex import Integers
 from densarm.world.world import World
@@ -154,13 +154,6 @@ def _cloud_trees(world: World) -> tuple[Integers, list[PointTree]]:
     return cloud, trees
 
 
-@compiled_part
-def tree_of(clouds: Clouds, c: int) -> PointTree:
-    """Return one of the trees."""
-    points = clouds.points[clouds.first[c, 0] : clouds.first[c + 1, 0]]
-    return PointTree(points, clouds.boxes[clouds.first[c, 1] : clouds.first[c + 1, 1]])
-
-
 def _joined(trees: list[PointTree]) -> Clouds:
     points, boxes = [np.zeros((0, 3))], [np.zeros((0, 6))]
     for tree in trees:
@@ -192,7 +185,7 @@ def _pose(item: pin.GeometryObject) -> pin.SE3:
 _NEIGHBOURS: WeakKeyDictionary[Arm, dict[str, Neighbours]] = WeakKeyDictionary()
 
 
-@compiled_part
+@compiled_lean_part
 def place(
     bodies: Bodies,
     angles: Array,
@@ -219,7 +212,7 @@ def place(
             compose(joint_pose[bodies.joint[body]], bodies.shapes[body], pose[body])
 
 
-@compiled_part
+@compiled_lean_part
 def write_motion_bounds(
     bodies: Bodies,
     step: Array,

@@ -7,10 +7,11 @@ from weakref import WeakKeyDictionary
 import numpy as np
 from numpy.typing import NDArray
 
-from densarm.scene.point_tree import DEEPEST, leaf_points, put_nearer_last
+from densarm.scene.point_tree import DEEPEST, PointTree, leaf_points, put_nearer_last
 from densarm.values.arrays import Array
-from densarm.values.kernels import compiled_part
-from densarm.world.bodies import Bodies, bodies_of, tree_of
+from densarm.values.kernels import compiled_lean_part, compiled_part
+from densarm.world.bodies import Bodies, bodies_of
+from densarm.world.hulls import Search, new_search
 from densarm.world.simplex import Integers
 from densarm.world.world import World
 
@@ -32,6 +33,39 @@ class Arc(NamedTuple):
     """How far a point of the link moves on either half at most [m]."""
     bend: float
     """β of the whole arc, as `SeparatingPlanes` has it [m]."""
+
+
+class CloudSpace(NamedTuple):
+    """Space in which a proof about a link and a cloud is found."""
+
+    search: Search
+    """For the distance of a point."""
+    seen: Array
+    """Pose of the cloud in the link's frame in the middle of the arc (12,)."""
+    ends: Array
+    """That of the link in the middle, in its frame at both ends of the arc (2, 12)."""
+    box: Array
+    """Least and largest coordinates of the link's hull (6,) [m]."""
+    places: Array
+    """A point, the middle of a box, and a direction (3, 3)."""
+    waiting: Integers
+    """Nodes that wait (64,)."""
+    bounds: Array
+    """How far they are at least (64,) [m]."""
+
+
+@compiled_part
+def new_cloud_space() -> CloudSpace:
+    """Return space for proofs."""
+    return CloudSpace(
+        new_search(),
+        np.empty(12),
+        np.empty((2, 12)),
+        np.empty(6),
+        np.empty((3, 3)),
+        np.empty(DEEPEST, np.int64),
+        np.empty(DEEPEST),
+    )
 
 
 class Fields(NamedTuple):
@@ -72,8 +106,8 @@ def _empty_fields(bodies: Bodies) -> Fields:
     return Fields(np.full(end, -1.0, np.float32), cells, sizes)
 
 
-@compiled_part
-def field_bound(bodies: Bodies, fields: Fields, pose: Array, arc: Arc) -> float:
+@compiled_lean_part
+def field_bound(bodies: Bodies, fields: Fields, pose: Array, arc: Arc, space: CloudSpace) -> float:
     """Return how far a link is from the points of a cloud at least, by balls that cover it [m].
 
     Args:
@@ -81,8 +115,9 @@ def field_bound(bodies: Bodies, fields: Fields, pose: Array, arc: Arc) -> float:
         fields: of their clouds; what is asked for and not known yet is found out.
         pose: of all bodies (S, 12).
         arc: the link and the cloud.
+        space: to work in.
     """
-    least, x, seen = math.inf, np.empty(3), np.empty(3)
+    least, x, seen = math.inf, space.places[0], space.places[1]
     frame, cloud = pose[arc.link], pose[arc.cloud]
     for n in range(bodies.first_cover[arc.link], bodies.first_cover[arc.link + 1]):
         for r in range(3):
@@ -92,25 +127,27 @@ def field_bound(bodies: Bodies, fields: Fields, pose: Array, arc: Arc) -> float:
         for k in range(3):
             seen[k] = cloud[k] * x[0] + cloud[3 + k] * x[1] + cloud[6 + k] * x[2]
         radius, c = bodies.covers[n, 3], bodies.cloud[arc.cloud]
-        far = _distance(bodies, fields, c, 0, math.inf, seen)
+        far = _distance(bodies, fields, c, 0, math.inf, seen, space)
         if far - radius <= arc.held + arc.half:
             most = far + 2.0 * math.sqrt(3.0) * fields.cells[c, 0]
-            far = _distance(bodies, fields, c, 1, most, seen)
+            far = _distance(bodies, fields, c, 1, most, seen, space)
         least = min(least, far - radius)
         if least <= arc.held:
             break
     return least
 
 
-@compiled_part
-def _distance(bodies: Bodies, fields: Fields, c: int, level: int, most: float, x: Array) -> float:
+@compiled_lean_part
+def _distance(
+    bodies: Bodies, fields: Fields, c: int, level: int, most: float, x: Array, space: CloudSpace
+) -> float:
     """Return a lower bound on the distance of a place (3,) from a cloud, both in its frame [m].
 
     No point is nearer to a place than to the nearest one in the cloud's box, since that is convex.
     """
     box, cell = bodies.clouds.boxes[bodies.clouds.first[c, 1]], fields.cells[c, level]
-    index, off, out, middle = fields.sizes[c, level, 3], 0.0, 0.0, np.empty(3)
-    stride = 1
+    index, off, out, stride = fields.sizes[c, level, 3], 0.0, 0.0, 1
+    middle = space.places[2]
     for axis in range(3):
         inside = min(max(x[axis], box[axis]), box[3 + axis])
         k = math.floor((inside - box[axis]) / cell + 0.5)
@@ -122,24 +159,25 @@ def _distance(bodies: Bodies, fields: Fields, c: int, level: int, most: float, x
     known = fields.distances[index]
     if known < 0.0:
         known = fields.distances[index] = np.float32(
-            _from_points(bodies, c, most, middle) * (1.0 - 1e-6)
+            _from_points(bodies, c, most, middle, space) * (1.0 - 1e-6)
         )
     return max(float(known) - math.sqrt(off), math.sqrt(out))
 
 
-@compiled_part
-def _from_points(bodies: Bodies, c: int, most: float, x: Array) -> float:
+@compiled_lean_part
+def _from_points(bodies: Bodies, c: int, most: float, x: Array, space: CloudSpace) -> float:
     """Return the distance of a place from the nearest point of a cloud, which is at most so far."""
-    tree = tree_of(bodies.clouds, c)
-    points, boxes = tree
-    waiting, bounds = np.zeros(DEEPEST, np.int64), np.zeros(DEEPEST)
+    points = bodies.clouds.points[bodies.clouds.first[c, 0] : bodies.clouds.first[c + 1, 0]]
+    boxes = bodies.clouds.boxes[bodies.clouds.first[c, 1] : bodies.clouds.first[c + 1, 1]]
+    waiting, bounds = space.waiting, space.bounds
+    waiting[0], bounds[0] = 0, 0.0
     count, least = 1, most * most
     while count > 0:
         count -= 1
         node = waiting[count]
         if bounds[count] >= least:
             continue
-        begin, end = leaf_points(tree, node)
+        begin, end = leaf_points(PointTree(points, boxes), node)
         if begin == end:
             one, other = 2 * node + 2, 2 * node + 1
             near, far = _square(boxes[one], x), _square(boxes[other], x)
@@ -152,7 +190,7 @@ def _from_points(bodies: Bodies, c: int, most: float, x: Array) -> float:
     return math.sqrt(least)
 
 
-@compiled_part
+@compiled_lean_part
 def _square(box: Array, x: Array) -> float:
     """Return the square of the distance of a place from a box (6,)."""
     square = 0.0

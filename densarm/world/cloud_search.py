@@ -6,7 +6,7 @@ import numpy as np
 
 from densarm.scene.point_tree import DEEPEST, PointTree, leaf_points, put_nearer_last
 from densarm.values.arrays import Array
-from densarm.values.kernels import compiled, compiled_part
+from densarm.values.kernels import compiled, compiled_lean_part, compiled_part
 from densarm.world.hulls import Hulls, Search, new_search, point_depth, point_gap
 from densarm.world.simplex import Integers
 
@@ -52,7 +52,7 @@ def place_balls(
             positions[ball, i] = cloud[9 + i] + along
 
 
-@compiled_part
+@compiled_lean_part
 def _write_row(pose: Array, row: Array) -> None:
     """Write a pose of a position and a unit quaternion (7,) as a row of twelve numbers."""
     w = pose[6]
@@ -65,7 +65,7 @@ def _write_row(pose: Array, row: Array) -> None:
         row[9 + i] = pose[i]
 
 
-@compiled_part
+@compiled_lean_part
 def _see(cloud: Array, position: Array, rotation: Array, seen: Array) -> None:
     """Write the pose (12,) of a cloud, given in the world, in a frame."""
     for r in range(3):
@@ -141,7 +141,7 @@ def nearest_point(  # noqa: C901  # what is called at each level is compiled onc
     return nearest
 
 
-@compiled_part
+@compiled_lean_part
 def write_middle(node: Array, middle: Array) -> float:
     """Write the middle (3,) of a node's box (6,) [m], and return how far corners are from it."""
     size = 0.0
@@ -151,7 +151,7 @@ def write_middle(node: Array, middle: Array) -> float:
     return math.sqrt(size)
 
 
-@compiled_part
+@compiled_lean_part
 def box_bound(node: Array, seen: Array, box: Array) -> float:
     """Return how far all of a node's box is from another at least, below zero if it may be inside.
 
@@ -172,7 +172,7 @@ def box_bound(node: Array, seen: Array, box: Array) -> float:
     return math.sqrt(outside) if outside > 0.0 else inside
 
 
-@compiled_part
+@compiled_lean_part
 def plane_bound(node: Array, seen: Array, plane: Array) -> float:
     """Return how far beyond a plane, unit normal and n · x on it (4,), a node's box is [m]."""
     beyond: float = -plane[3]
@@ -184,7 +184,7 @@ def plane_bound(node: Array, seen: Array, plane: Array) -> float:
     return beyond
 
 
-@compiled_part
+@compiled_lean_part
 def see(pose: Array, point: Array, seen: Array) -> None:
     """Write where a point (3,) of a frame is in another, in which that frame has a pose (12,)."""
     for r in range(3):

@@ -10,7 +10,7 @@ import numpy as np
 
 from densarm.scene.shapes import extreme_points
 from densarm.values.arrays import Array
-from densarm.values.kernels import compiled_part
+from densarm.values.kernels import compiled_lean_part, compiled_part
 from densarm.world.simplex import Integers, approach_origin
 
 _SLICES = 16  # of a hull that balls cover
@@ -124,7 +124,7 @@ def new_search() -> Search:
     return Search(np.empty((4, 4)), np.empty((4, 4)), np.zeros((5, 2), np.int64), np.zeros(4))
 
 
-@compiled_part
+@compiled_lean_part
 def point_gap(
     points: Array,
     edges: Integers,
@@ -184,7 +184,7 @@ def point_gap(
     return best, norm
 
 
-@compiled_part
+@compiled_lean_part
 def farthest_corner(
     points: Array, edges: Integers, start: int, a: float, b: float, c: float
 ) -> tuple[int, float]:
@@ -201,7 +201,7 @@ def farthest_corner(
     return corner, best
 
 
-@compiled_part
+@compiled_lean_part
 def point_depth(hulls: Hulls, body: int, x: Array, plane: Array) -> float:
     """Return the signed distance of a point inside a hull [m], and write the nearest face (4,)."""
     deepest, face = -math.inf, -1

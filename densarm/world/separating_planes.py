@@ -1,36 +1,26 @@
 """SeparatingPlanes: a fast proof that straight joint-space segments touch nothing."""
 
-import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from densarm.values.arrays import Array
 from densarm.values.checks import non_negative
-from densarm.values.kernels import compiled, compiled_part
-from densarm.world.bodies import (
-    BALL,
-    BOX,
-    RADIUS,
-    Bodies,
-    bodies_of,
-    place,
-    write_motion_bounds,
+from densarm.values.kernels import compiled, entry_point
+from densarm.world.arc_separation import (
+    NOTHING,
+    Memory,
+    is_met_again,
+    new_arc_space,
+    write_unproved,
 )
-from densarm.world.cloud_field import Arc, Fields, field_bound, fields_of
-from densarm.world.cloud_separation import unproved_halves
-from densarm.world.separation import climb, separation, stays_apart
-from densarm.world.simplex import Integers
+from densarm.world.bodies import Bodies, bodies_of
+from densarm.world.cloud_field import fields_of
+from densarm.world.cloud_separation import PLANES
 from densarm.world.world import DISTANCE_TOLERANCE, World
 
 _FLOOR = 1e-4  # [rad or m], length of a segment at which one not proved clear counts as not clear
 _FIRST = 8  # pairs that were not clear lately, which are looked at before all others
-# What is known of a pair on an arc, where it is not which face of a box is between its bodies.
-_PROVED, _NOTHING, _PLANE = -3, -2, -1
-_OPEN = -3  # less 1, 2 or 3: of a cloud, what is not proved is one half, the other, or both
-_BOTH = 3
-_SHORTEST = 0.04  # part of an arc that a field is asked for; nearer to a cloud it costs too many
 
 
 class Tube(NamedTuple):
@@ -100,10 +90,13 @@ class SeparatingPlanes:
         corners = np.full((world.n_pairs, 4, 2), -1)
         corners[:, 0] = some_corner
         order = np.flatnonzero(world.changes > 0)
-        self._memory = _Memory(corners, order, fields_of(world))
-        nothing, rest = np.zeros(0, np.int64), np.zeros((2, world.arm.nv))
-        # Kernels are loaded, or compiled, here rather than where a plan's time is taken.
-        _polyline_is_clear(self._bodies, self._memory._replace(order=nothing), self._least, rest)
+        planes = np.full((world.n_pairs if world.clouds else 0, *PLANES), np.inf)
+        self._memory = Memory(corners, order, planes, fields_of(world))
+        # Loaded, or compiled, here rather than where a plan's time is taken.
+        types = self._bodies, self._memory, self._least, np.zeros((2, world.arm.nv))
+        self._kernel = entry_point(_polyline_is_clear, *types)
+        self.asked = 0
+        """How many questions it was asked."""
 
     def configuration_is_clear(self, q: Array) -> bool:
         """Return whether every distance at q (nq,) is proved above the margin."""
@@ -126,7 +119,7 @@ class SeparatingPlanes:
             angles: joint positions that it goes through (N, nv) [rad or m], N >= 2; continuous
                 joints count their turns.
         """
-        return self._is_clear(np.ascontiguousarray(angles), self._least)
+        return self._is_clear(np.ascontiguousarray(angles, np.float64), self._least)
 
     def tube_is_clear(self, tube: Tube) -> bool:
         """Return whether every distance is proved above the margin in all of a tube."""
@@ -135,32 +128,17 @@ class SeparatingPlanes:
 
     def _is_clear(self, angles: Array, least: Array) -> bool:
         self._world.require_version(self._version)
-        return bool(_polyline_is_clear(self._bodies, self._memory, least, angles))
+        self.asked += 1
+        return bool(self._kernel(self._bodies, self._memory, least, angles))
 
 
 def _ends(begin: Array, step: Array) -> Array:
     return np.array([begin, begin + step])
 
 
-class _Memory(NamedTuple):
-    """What later questions are quicker by; overwritten."""
-
-    corners: Integers
-    """Corners of each pair (K, 4, 2) by which a plane was found, see `separation`."""
-    order: Integers
-    """The pairs in the order in which they are looked at; one that was not clear is put first."""
-    fields: Fields
-    """How far places are from clouds."""
-
-
 @compiled
-def _polyline_is_clear(  # noqa: C901  # what is called at each level is compiled once more
-    bodies: Bodies, memory: _Memory, least: Array, points: Array
-) -> bool:
+def _polyline_is_clear(bodies: Bodies, memory: Memory, least: Array, points: Array) -> bool:
     """Prove all pairs on a polyline, on all of it those first that were not clear lately.
-
-    On each arc of a segment pairs are proved by faces of boxes, which are the cheapest planes,
-    then by planes that are looked for; what is left is tried again on both halves of the arc.
 
     Args:
         bodies: the bodies.
@@ -168,197 +146,32 @@ def _polyline_is_clear(  # noqa: C901  # what is called at each level is compile
         least: distance that each pair must exceed (K,) [m].
         points: joint positions that it goes through (N, nv) [rad or m].
     """
-    n_joints, n_bodies = bodies.parent.size, bodies.joint.size
-    pairs, shapes = bodies.pairs, bodies.shapes
-    # Of one arc at a time: where all is at its beginning, in its middle and at its end.
-    joint_poses, poses = np.empty((3, n_joints, 12)), np.empty((3, n_bodies, 12))
-    bounds, is_asked = np.empty((2, n_bodies, n_joints)), np.empty(n_bodies, np.bool_)
-    # Of each pair a normal, and the gap that its plane leaves [m].
-    planes, work, step = np.empty((least.size, 4)), np.empty((8, 4)), np.empty(points.shape[1])
+    space = new_arc_space(bodies.parent.size, bodies.joint.size, least.size)
+    step = space.step
     n_segments, first = points.shape[0] - 1, memory.order[:_FIRST]
-    for part in range(2 * n_segments):
-        order = first if part < n_segments else memory.order[_FIRST:]
-        angles, longest = points[part % n_segments], 0.0
+    for part in range(3 * n_segments):
+        stage, off = part // n_segments, part % n_segments
+        # From the middle on: what is new about a way is clear at its ends as a rule.
+        segment = (n_segments - 1) // 2 + (off + 1) // 2 * (2 * (off % 2) - 1)
+        angles, longest = points[segment], 0.0
         for j in range(step.size):
-            step[j] = points[part % n_segments + 1, j] - angles[j]
+            step[j] = points[segment + 1, j] - angles[j]
             longest = max(longest, abs(step[j]))
+        if stage == 0:
+            if is_met_again(bodies, memory, least, angles, first, space):
+                return False
+            continue
+        order = first if stage == 1 else memory.order[_FIRST:]
         # Pairs, arcs on which they are not proved, and what is known of them there.
         waiting = np.empty((order.size, 3), np.int64)
         for n in range(order.size):
-            waiting[n, 0], waiting[n, 1], waiting[n, 2] = order[n], 0, _NOTHING
+            waiting[n, 0], waiting[n, 1], waiting[n, 2] = order[n], 0, NOTHING
         share = 1.0  # of the segment that an arc is
         while waiting.shape[0] > 0:
-            halves, written, end = np.empty((2 * waiting.shape[0], 3), np.int64), 0, 0
-            while end < waiting.shape[0]:
-                begin, arc = end, waiting[end, 1]
-                while end < waiting.shape[0] and waiting[end, 1] == arc:
-                    end += 1
-                rows, joint_pose, pose = waiting[begin:end], joint_poses[1], poses[1]
-                _ask_for(pairs, rows, is_asked)
-                place(bodies, angles, step, share * (arc + 0.5), is_asked, joint_pose, pose)
-                write_motion_bounds(bodies, step, share, is_asked, joint_pose, pose, bounds)
-                motion, bend = bounds[0], bounds[1]
-                _look_at_faces(bodies, least, pose, motion, rows, planes)
-                # Pairs that no face is between first, for one of them may be in contact.
-                for faces_are_done in range(2):
-                    for n in range(begin, end):
-                        if waiting[n, 2] == _NOTHING:
-                            k = waiting[n, 0]
-                            i, j, c = pairs[k, 0], pairs[k, 1], pairs[k, 2]
-                            held = least[k] + shapes[i, RADIUS] + shapes[j, RADIUS]
-                            half = 0.5 * (motion[i, c] + motion[j, c])
-                            if bodies.cloud[j] >= 0:
-                                on = Arc(i, j, held, half, bend[i, c] + bend[j, c])
-                                start, left = memory.corners[k, 0, 0], _BOTH
-                                if faces_are_done:
-                                    left = unproved_halves(bodies, poses, on, start)
-                                else:
-                                    far = field_bound(bodies, memory.fields, pose, on) - held
-                                    if far > half:
-                                        left = 0
-                                    elif far < _SHORTEST * half:
-                                        continue
-                                if left < 0:
-                                    _move_to_front(memory.order, k)
-                                    return False
-                                waiting[n, 2] = _OPEN - left
-                                continue
-                            corners, plane, enough = memory.corners[k], planes[k], held + half
-                            gap = separation(bodies, pose, i, j, held, enough, corners, work, plane)
-                            gap -= held
-                            if not gap > 0.0:
-                                _move_to_front(memory.order, k)
-                                return False
-                            plane[3] = gap
-                            waiting[n, 2] = _PROVED if gap > half else _PLANE
-                    if faces_are_done or not _ask_for(pairs, rows, is_asked):
-                        break
-                    for side in (0, 2):
-                        at = share * (arc + 0.5 * side)
-                        place(bodies, angles, step, at, is_asked, joint_poses[side], poses[side])
-                    _look_at_ends(bodies, least, poses, bend, rows, planes)
-                for side in (0, 2):
-                    for n in range(begin, end):
-                        if waiting[n, 2] < _OPEN and (_OPEN - waiting[n, 2]) >> (side // 2) & 1:
-                            written = _write_half(
-                                halves, written, waiting[n, 0], 2 * arc + side // 2
-                            )
-                        elif waiting[n, 2] == _PLANE:
-                            k, normal = waiting[n, 0], work[0]
-                            i, j, c = pairs[k, 0], pairs[k, 1], pairs[k, 2]
-                            _carry(joint_pose, joint_poses[side], c, planes[k], normal)
-                            # The corners that it ends at are of no use, and overwritten.
-                            start, ends = memory.corners[k, 0], halves[written]
-                            gap = climb(bodies, poses[side], i, j, start, normal, ends)
-                            gap -= least[k] + shapes[i, RADIUS] + shapes[j, RADIUS]
-                            if not stays_apart(planes[k, 3], gap, bend[i, c] + bend[j, c]):
-                                written = _write_half(halves, written, k, 2 * arc + side // 2)
-            if written > 0 and longest * share <= _FLOOR:
+            halves = np.empty((2 * waiting.shape[0], 3), np.int64)
+            written = write_unproved(bodies, memory, least, angles, share, waiting, halves, space)
+            if written < 0 or (written > 0 and longest * share <= _FLOOR):
                 return False
             waiting = halves[:written]
             share *= 0.5
     return True
-
-
-@compiled_part
-def _write_half(halves: Integers, row: int, pair: int, arc: int) -> int:
-    """Write that a pair is not proved on an arc, and return the next row."""
-    halves[row, 0], halves[row, 1], halves[row, 2] = pair, arc, _NOTHING
-    return row + 1
-
-
-@compiled_part
-def _ask_for(pairs: Integers, rows: Integers, is_asked: NDArray[np.bool_]) -> bool:
-    """Write which bodies are of pairs that are not proved; return whether there are any."""
-    is_any = False
-    for body in range(is_asked.size):
-        is_asked[body] = False
-    for n in range(rows.shape[0]):
-        if rows[n, 2] != _PROVED:
-            k = rows[n, 0]
-            is_asked[pairs[k, 0]] = is_asked[pairs[k, 1]] = is_any = True
-    return is_any
-
-
-@compiled_part
-def _look_at_faces(
-    bodies: Bodies, least: Array, pose: Array, motion: Array, rows: Integers, planes: Array
-) -> None:
-    """Look for faces of boxes that are between pairs, or prove them, in the middle of an arc.
-
-    Before that for balls that are apart, which proves what is far in the fewest operations.
-    """
-    shapes = bodies.shapes
-    for n in range(rows.shape[0]):
-        k = rows[n, 0]
-        i, j, c = bodies.pairs[k, 0], bodies.pairs[k, 1], bodies.pairs[k, 2]
-        needed, square = least[k] + 0.5 * (motion[i, c] + motion[j, c]), 0.0
-        needed += shapes[i, BALL] + shapes[j, BALL]
-        for axis in range(9, 12):
-            square += (pose[i, axis] - pose[j, axis]) ** 2
-        if square > needed * needed:
-            rows[n, 2] = _PROVED
-            continue
-        if bodies.joint[j] == c:
-            face, gap = 0, -math.inf
-            for axis in range(3):
-                offset, extent = _across(bodies.shapes, i, j, axis, pose)
-                if abs(offset) - extent > gap:
-                    face, gap = 2 * axis + (1 if offset < 0.0 else 0), abs(offset) - extent
-            gap -= least[k]
-            planes[k, 3] = gap
-            if gap > 0.0:
-                proved = gap > 0.5 * (motion[i, c] + motion[j, c])
-                rows[n, 2] = _PROVED if proved else face
-
-
-@compiled_part
-def _look_at_ends(
-    bodies: Bodies, least: Array, poses: Array, bend: Array, rows: Integers, planes: Array
-) -> None:
-    """Find out whether faces between pairs prove them, by the gaps at both ends of an arc."""
-    for n in range(rows.shape[0]):
-        k, face = rows[n, 0], rows[n, 2]
-        if face >= 0:
-            rows[n, 2] = _PROVED
-            i, j, c = bodies.pairs[k, 0], bodies.pairs[k, 1], bodies.pairs[k, 2]
-            for side in (0, 2):
-                offset, extent = _across(bodies.shapes, i, j, face >> 1, poses[side])
-                beyond = (1.0 - 2.0 * (face & 1)) * offset - extent - least[k]
-                if not stays_apart(planes[k, 3], beyond, bend[i, c] + bend[j, c]):
-                    rows[n, 2] = _NOTHING
-
-
-@compiled_part
-def _across(shapes: Array, other: int, one: int, axis: int, pose: Array) -> tuple[float, float]:
-    """Return how far a box is off another along an axis of the other, and their half widths."""
-    offset, extent = 0.0, shapes[one, BOX + axis]
-    for k in range(3):
-        offset += pose[one, 3 * k + axis] * (pose[other, 9 + k] - pose[one, 9 + k])
-        along = 0.0
-        for row in range(0, 9, 3):
-            along += pose[one, row + axis] * pose[other, row + k]
-        extent += abs(along) * shapes[other, BOX + k]
-    return offset, extent
-
-
-@compiled_part
-def _carry(middle: Array, end: Array, joint: int, plane: Array, normal: Array) -> None:
-    """Write what becomes of a normal that moves with a joint from an arc's middle to one end."""
-    normal[0] = normal[1] = normal[2] = 0.0
-    for column in range(3):
-        along = 0.0
-        for row in range(3):
-            along += middle[joint, 3 * row + column] * plane[row]
-        for row in range(3):
-            normal[row] += end[joint, 3 * row + column] * along
-
-
-@compiled_part
-def _move_to_front(order: Integers, pair: int) -> None:
-    """Put a pair before all others, which keep their order."""
-    before = pair
-    for n in range(order.size):
-        before, order[n] = order[n], before
-        if before == pair:
-            break

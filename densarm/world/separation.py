@@ -3,7 +3,7 @@
 import math
 
 from densarm.values.arrays import Array
-from densarm.values.kernels import compiled_part
+from densarm.values.kernels import compiled_lean_part
 from densarm.world.bodies import Bodies
 from densarm.world.hulls import farthest_corner
 from densarm.world.simplex import Integers, approach_origin
@@ -15,7 +15,7 @@ _ITERATIONS = 40
 _CONTACT = 1e-9  # [m], closer than this no plane is looked for
 
 
-@compiled_part
+@compiled_lean_part
 def separation(
     bodies: Bodies,
     pose: Array,
@@ -90,7 +90,7 @@ def separation(
     return best
 
 
-@compiled_part
+@compiled_lean_part
 def climb(
     bodies: Bodies,
     pose: Array,
@@ -120,7 +120,7 @@ def climb(
     return beyond
 
 
-@compiled_part
+@compiled_lean_part
 def stays_apart(gap_a: float, gap_b: float, bend: float) -> bool:
     """Return whether a plane's gaps [m] at the middle and at an end of an arc prove that half.
 
@@ -132,7 +132,7 @@ def stays_apart(gap_a: float, gap_b: float, bend: float) -> bool:
     return bend < 8.0 * root * root
 
 
-@compiled_part
+@compiled_lean_part
 def _write_difference(
     points: Array, pose: Array, i: int, j: int, corners: Integers, row: int, simplex: Array
 ) -> None:
@@ -144,7 +144,7 @@ def _write_difference(
         simplex[row, k] = difference
 
 
-@compiled_part
+@compiled_lean_part
 def _is_known(corners: Integers, last: int) -> bool:
     """Return whether the last pair of corners is one of those before it."""
     for k in range(last):

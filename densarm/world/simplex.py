@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from densarm.values.arrays import Array
-from densarm.values.kernels import compiled_part
+from densarm.values.kernels import compiled_lean_part
 
 Integers = NDArray[np.int64]
 
@@ -12,7 +12,7 @@ _NO_WEIGHT = 1e-12
 _FLAT = 1e-12  # of a corner's squared distance, what may be left of it beside the others
 
 
-@compiled_part
+@compiled_lean_part
 def approach_origin(simplex: Array, system: Array, corners: Integers, count: int) -> int:
     """Reduce a simplex to a face whose plane is nearest to the origin inside that face.
 
@@ -55,7 +55,7 @@ def approach_origin(simplex: Array, system: Array, corners: Integers, count: int
     return count
 
 
-@compiled_part
+@compiled_lean_part
 def _write_affine_weights(simplex: Array, system: Array, count: int) -> bool:
     """Write weights of the point nearest to the origin in the plane through all corners.
 

@@ -137,6 +137,8 @@ def test_segments_proved_clear_are_clear(
         least = min(float(world.distances(q).min()) for q in way)
         is_clear = planes.segment_is_clear(way[0], way[-1])
         assert not is_clear or least > margin
+        parts = a + np.linspace(0.0, 1.0, 4)[:, np.newaxis] * (b - a)
+        assert not planes.polyline_is_clear(parts) or least > margin
         # Both proofs may stop short, at different depths, but of what keeps off far enough.
         assert (
             is_clear
