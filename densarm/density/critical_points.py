@@ -16,7 +16,7 @@ from densarm.values.arrays import Array
 LONGEST_MOVE = 0.1
 """Longest move of one iteration of Newton's method [m]."""
 
-_SEARCH_STEPS = 20
+_SEARCH_STEPS = 8
 _FARTHEST = 0.05  # [rad or m] from the arm's rest to the critical point that it rests at
 _FLAT = 1e-6  # of the pull of the goal, or [1/rad] where that is less than one
 _BESIDE = 1e-3  # [rad or m] from a critical point that a curve is led to
@@ -52,7 +52,11 @@ class CriticalPoint:
 
 
 def find_critical_point(
-    gradient: Callable[[Array], Array], guess: Array, step: float = 1e-5, iterations: int = 50
+    gradient: Callable[[Array], Array],
+    guess: Array,
+    step: float = 1e-5,
+    iterations: int = 50,
+    farthest: float = np.inf,
 ) -> CriticalPoint:
     r"""Solve ∇ ln ρ = 0 by Newton's method.
 
@@ -67,6 +71,7 @@ def find_critical_point(
         guess: where to begin, shape (n,) [m]; at most `LONGEST_MOVE` is gone in one iteration.
         step: ε [m].
         iterations: most iterations.
+        farthest: from the guess, beyond which the search ends [m].
 
     Returns:
         The last point, whose `slope` tells whether it is critical.
@@ -76,7 +81,7 @@ def find_critical_point(
         move = np.linalg.lstsq(log_hessian(gradient, x, step), -gradient(x), rcond=None)[0]
         length = float(np.linalg.norm(move))
         x = x + move * min(1.0, LONGEST_MOVE / max(length, 1e-300))
-        if length < 1e-14:
+        if length < 1e-14 or np.abs(x - guess).max() > farthest:
             break
     eigenvalues, _, zero = _eigensystem(gradient, x, step)
     slope = float(np.linalg.norm(gradient(x)))
@@ -181,7 +186,8 @@ def find_stall(
     """
     arm = clearance_set.world.arm
     gradient = partial(density.log_gradients, q)
-    point = find_critical_point(gradient, np.zeros(arm.nv), iterations=_SEARCH_STEPS)
+    guess = np.zeros(arm.nv)
+    point = find_critical_point(gradient, guess, 1e-5, _SEARCH_STEPS, _FARTHEST)
     sample = density.evaluate(q)
     distance = max(sample.goal_distance, 1e-300)
     pull = -density.parameters.alpha * sample.goal_distance_gradient / distance
