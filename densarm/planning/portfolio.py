@@ -18,6 +18,7 @@ from densarm.world.swept_check import SweptCheck
 _NEAR_ENOUGH = 1.03  # times the straight way's time, in which no other way to that goal is tried
 _ITERATIONS, _SHORTCUTS, _BENDS = 800, 100, 400  # of each way
 _FINAL = 1500  # bends that are tried on the quickest
+_ASKED = 9000  # proofs that were asked for, with which a way that was found is enough
 _SHARES = 1.0, 0.25  # of the path margin, tried in turn
 
 
@@ -34,7 +35,8 @@ def quickest_way(
     """Return the quickest of the ways that attempts find, rounded; None without any.
 
     Goals have their turns, that first which a straight way would soonest be at. One is left out
-    when a straight way there is hardly quicker than what was found.
+    when a straight way there is hardly quicker than what was found. Where searches took long, fewer
+    are made.
 
     Args:
         check: the world and the safety margin.
@@ -56,7 +58,8 @@ def quickest_way(
     rng = np.random.default_rng(seed)
     for turn in range(attempts):
         for n in order:
-            if made == attempts or least < _NEAR_ENOUGH * soonest[n]:
+            is_enough = best is not None and sum(x.asked for x in spaces.values()) > _ASKED
+            if made == attempts or is_enough or least < _NEAR_ENOUGH * soonest[n]:
                 continue
             made += 1
             depart, arrive, most = known[n] = known.get(n) or ends(goals[n].q)

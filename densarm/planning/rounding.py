@@ -241,25 +241,29 @@ def _apart(points: Array, i: int, k: int) -> float:
 def _time(points: Array, allowed: Array) -> float:
     """Return about how long a way through joint positions (N, nv) takes, see `way_time`."""
     n, nv = points.shape
-    step, square = np.empty(n), np.empty(n)  # of lengths, and of speeds
-    slope, bend = np.empty((n, nv)), np.zeros((n, nv))
+    step, per_step, square = np.empty(n), np.empty(n), np.empty(n)  # of lengths, and of speeds
+    slope, bend = np.empty((n, nv)), np.empty((n, nv))
     for i in range(n - 1):
         step[i] = _apart(points, i, i + 1) + _SLIGHT
+        per_step[i] = 1.0 / step[i]
     for i in range(n):
         before, after = max(i - 1, 0), min(i + 1, n - 1)
+        per_both = 1.0 / (step[before] + step[after - 1])
         fastest = _UNLIMITED**2
         for j in range(nv):
-            come = (points[i, j] - points[before, j]) / step[before]
-            go = (points[after, j] - points[i, j]) / step[after - 1]
+            come = (points[i, j] - points[before, j]) * per_step[before]
+            go = (points[after, j] - points[i, j]) * per_step[after - 1]
             if before == i or after == i:
-                slope[i, j] = come + go
+                slope[i, j], bend[i, j] = come + go, 0.0
             else:
-                whole = step[before] + step[i]
-                slope[i, j] = (come * step[i] + go * step[before]) / whole
-                bend[i, j] = 2.0 * (go - come) / whole
-            steepest = max(abs(come), abs(go)) + _SLIGHT
-            fastest = min(fastest, (allowed[0, j] / steepest) ** 2)
-            fastest = min(fastest, allowed[1, j] / (abs(bend[i, j]) + _SLIGHT))
+                slope[i, j] = (come * step[i] + go * step[before]) * per_both
+                bend[i, j] = 2.0 * (go - come) * per_both
+            # Compared before it is divided, which takes longest.
+            steepest, sharpest = max(abs(come), abs(go)) + _SLIGHT, abs(bend[i, j]) + _SLIGHT
+            if fastest * steepest * steepest > allowed[0, j] * allowed[0, j]:
+                fastest = (allowed[0, j] / steepest) ** 2
+            if fastest * sharpest > allowed[1, j]:
+                fastest = allowed[1, j] / sharpest
         square[i] = fastest
     square[0] = square[n - 1] = 0.0
     for i in range(1, n):
@@ -280,12 +284,13 @@ def _bound(
 
     It is twice the way between them times s̈ larger, the way backwards being negative.
     """
-    largest = square[far]
+    largest, per_twice = square[far], 1.0 / twice
     for j in range(slope.shape[1]):
         for i in (near, far):
-            by_rise = slope[i, j] / twice + (bend[i, j] if i == far else 0.0)
+            by_rise = slope[i, j] * per_twice + (bend[i, j] if i == far else 0.0)
             constant = bend[i, j] * square[near]
-            if abs(by_rise) > _SLIGHT:
-                room = max(0.0, most[j] - math.copysign(constant, constant * by_rise))
-                largest = min(largest, square[near] + room / abs(by_rise))
+            room = max(0.0, most[j] - math.copysign(constant, constant * by_rise))
+            rise = abs(by_rise)
+            if rise > _SLIGHT and rise * (largest - square[near]) > room:
+                largest = square[near] + room / rise
     square[far] = largest
