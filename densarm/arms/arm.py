@@ -316,13 +316,14 @@ def load_arm(
     armature: Vector | float | None = None,
     frames: Mapping[str, Pose] | None = None,
 ) -> Arm:
-    """Load an arm by name or from a URDF file.
+    """Load an arm by name, or from a URDF or MJCF file.
 
     Joints that mimic locked ones are locked with them. `Arm.remarks` tells what of the files was
     not taken as it stands.
 
     Args:
-        robot: a known name (``densarm list``), or the path of a URDF.
+        robot: a known name (``densarm list``), or the path of a URDF, or of an MJCF, whose bodies
+            are links here.
         srdf: path of an SRDF, for disabled pairs and postures.
         package_dirs: folders that ``package://`` paths of meshes start from; the URDF's own
             folder and those above it are searched too.
@@ -363,8 +364,9 @@ def load_arm(
             that shall be in the arm, shapes, links to collide as drawn or an inertia of another
             name, a density that is not positive or not read, limits that are not positive or of
             another length, or a negative armature.
-        FileContentError: a file that cannot be read.
+        FileContentError: a file that cannot be read, or an MJCF that cannot be used.
         RobotDescriptionError: a URDF or SRDF that cannot be used.
+        DensarmError: an MJCF, and MuJoCo is not installed.
     """
     description = robot_description(robot)
     folders = [str(Path(folder).resolve()) for folder in _listed(package_dirs)]

@@ -3,7 +3,9 @@
 from pathlib import Path
 
 from densarm.arms.description import DATA_WHEEL, RobotDescription, own_frames, resolve_path
+from densarm.arms.mjcf import mjcf_description
 from densarm.errors import UnknownNameError
+from densarm.scene.mjcf import xml_root
 from densarm.values.files import read_text, read_toml
 
 
@@ -25,13 +27,17 @@ def scenario_paths() -> dict[str, Path]:
 
 
 def robot_description(robot: str | Path) -> RobotDescription:
-    """Return the description of one of `robot_names`, or of the URDF at a path."""
+    """Return the description of one of `robot_names`, or of the URDF or MJCF at a path."""
     path = Path(robot)
     if str(robot) not in robot_names():
         if path.suffix != ".urdf" and not path.is_file():
-            raise UnknownNameError("robot", robot, [*robot_names(), "the path of a .urdf file"])
+            known = [*robot_names(), "the path of a .urdf or MJCF file"]
+            raise UnknownNameError("robot", robot, known)
+        text = read_text(path)
+        if xml_root(text) == "mujoco":
+            return mjcf_description(path)
         nearby = [str(above) for above in path.resolve().parents]
-        return RobotDescription(name=path.stem, urdf=read_text(path), package_dirs=nearby)
+        return RobotDescription(name=path.stem, urdf=text, package_dirs=nearby)
     folder = robots_folder() / path
     entry = read_toml(folder / "arm.toml")
     urdf, srdf = entry.pop("urdf"), entry.pop("srdf", None)

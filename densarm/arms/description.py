@@ -77,6 +77,8 @@ class RobotDescription:
     """Bodies that the arm holds."""
     frames: Mapping[str, Pose] = field(default_factory=dict)
     """Frames of one's own by name, each at a pose in the frame of a link."""
+    remarks: Sequence[str] = ()
+    """What the URDF has not of the file that it was made of, one phrase each."""
 
     def __post_init__(self) -> None:
         one_of("shapes", self.shapes, ["hull", "pieces", "capsule"])
@@ -87,7 +89,7 @@ class RobotDescription:
             raise InvalidValueError("density", self.density, "with inertia = 'from_shapes' only")
         if self.density is not None:
             positive("density", self.density)
-        for key in ("package_dirs", "base_placement", *PER_JOINT, "attachments"):
+        for key in ("package_dirs", "base_placement", *PER_JOINT, "attachments", "remarks"):
             object.__setattr__(self, key, _frozen(getattr(self, key)))
         for key in ("torque_rate", "jerk"):
             if getattr(self, key) == math.inf:

@@ -119,7 +119,7 @@ def build_models(description: RobotDescription) -> RobotModels:
             inertia = evenly_filled(items, attachment.mass)
             model.appendBodyToJoint(items[0].parentJoint, inertia, pin.SE3.Identity())
     _add_frames(model, description.frames)
-    remarks = (*urdf.remarks, *flat, *unknown_links(model, description.srdf))
+    remarks = (*description.remarks, *urdf.remarks, *flat, *unknown_links(model, description.srdf))
     drawn = urdf.links_without_collision
     return RobotModels(model, *cut, files, drawn, remarks, needed, origin)
 

@@ -7,11 +7,15 @@ from pathlib import Path
 from typing import Any
 
 from densarm.errors import DensarmError, FileContentError, InvalidValueError
+from densarm.scene.mjcf import read_mjcf_scene
 from densarm.scene.moveit import read_moveit_scene
 from densarm.scene.moveit_yaml import read_moveit_yaml
 from densarm.scene.scene import Scene
+from densarm.scene.sdf import read_sdf_scene
 from densarm.values.checks import finite_number, finite_tuple, non_negative_integer
 from densarm.values.files import read_text
+
+_SUFFIXES = ".scene, .yaml, .yml, .json, .xml, .sdf and .world"
 
 
 @dataclass(frozen=True)
@@ -40,18 +44,25 @@ def load_scene(path: str | Path) -> Scene:
     """Load a scene from a file, by its suffix.
 
     ``.scene`` is MoveIt's text format, ``.yaml`` or ``.yml`` its planning-scene message, ``.json``
-    a file of MotionBenchMaker with a single problem. Poses are taken as in the world.
+    a file of MotionBenchMaker with a single problem, ``.xml`` an MJCF, of which all is taken that
+    is no part of an arm, ``.sdf`` or ``.world`` an SDFormat world. Poses are taken as in the world.
 
     Raises:
-        FileContentError: it cannot be read, another suffix, or more than one scene.
+        FileContentError: it cannot be read, another suffix, more than one scene, or a shape that
+            has no place here, by its name.
+        DensarmError: an MJCF, and MuJoCo is not installed.
     """
     file = Path(path)
     if file.suffix == ".scene":
         return read_moveit_scene(file)
     if file.suffix in (".yaml", ".yml"):
         return read_moveit_yaml(file)
+    if file.suffix == ".xml":
+        return read_mjcf_scene(file)
+    if file.suffix in (".sdf", ".world"):
+        return read_sdf_scene(file)
     if file.suffix != ".json":
-        raise FileContentError(file, "not a scene: the suffix must be .scene, .yaml, .yml or .json")
+        raise FileContentError(file, f"not a scene: the suffix must be one of {_SUFFIXES}")
     problems = load_problems(file)
     if len(problems) != 1:
         reason = f"holds {len(problems)} problems, not one: use densarm.load_problems"

@@ -14,7 +14,8 @@ import pinocchio as pin
 
 from densarm.arms.joint_space import joint_axis
 from densarm.certificates.task import Input
-from densarm.errors import DensarmError, FileContentError, InvalidValueError
+from densarm.errors import DensarmError, InvalidValueError
+from densarm.scene.mjcf import mjcf_spec, require_mujoco
 from densarm.simulation.disturbances import Disturbances
 from densarm.values.arrays import Array
 from densarm.values.checks import positive
@@ -66,7 +67,7 @@ class MujocoPlant:
         spec: mujoco.MjSpec | None = None,
         joints: Sequence[str] | None = None,
     ) -> None:
-        self._mujoco = mj = require_mujoco()
+        self._mujoco = mj = require_mujoco("plant 'mujoco'")
         self.dt, self.disturbances = positive("dt", dt), disturbances
         self._world, arm = world, world.arm
         self._own = spec is not None
@@ -139,13 +140,7 @@ class MujocoPlant:
             FileContentError: it cannot be read.
             DensarmError: as `MujocoPlant`.
         """
-        if not Path(path).is_file():
-            raise FileContentError(path, "no such file")
-        try:
-            spec = require_mujoco().MjSpec.from_file(str(path))
-        except ValueError as error:
-            raise FileContentError(path, " ".join(str(error).split())) from None
-        return cls(world, dt, disturbances, spec=spec, joints=joints)
+        return cls(world, dt, disturbances, spec=mjcf_spec(Path(path)), joints=joints)
 
     def step(self, q: Array, v: Array, u: Array) -> tuple[Array, Array]:
         """Act as `Plant.step`, u the torque [N·m or N].
@@ -299,22 +294,6 @@ class MujocoPlant:
                 model.geom_size[geom, :2] = item.geometry.radius, half
                 model.geom_rbound[geom] = item.geometry.radius + half
         self._placed = world.version
-
-
-def require_mujoco() -> Any:
-    """Return the module, or refuse with how to install it.
-
-    Raises:
-        DensarmError: MuJoCo is not installed.
-    """
-    try:
-        import mujoco
-    except ImportError:
-        message = (
-            "plant 'mujoco' needs MuJoCo, which is not installed: pip install 'densarm[mujoco]'"
-        )
-        raise DensarmError(message) from None
-    return mujoco
 
 
 def _require_joints(spec: mujoco.MjSpec, names: Sequence[str], of_arm: Sequence[str]) -> None:

@@ -42,12 +42,12 @@ _FILE = {
     "title": Key("title", "text", "the file's name", "What pages and pictures say above it."),
     "robot": Key("robot", "table", "required", "The arm."),
     "task": Key("task", "table", "required", "Start and goal."),
-    "scene": Key("scene", "text", "–", "Path of a `.scene`, `.yaml` or `.json`, beside this file."),
+    "scene": Key("scene", "text", "–", "Path of [a scene](formats.md), beside this file."),
     "obstacles": Key("obstacles", "tables", "–", "Bodies, each a table `[[obstacles]]`."),
 }
 _ROBOT = {
     "name": "A known robot (`densarm list`); either this or `urdf`.",
-    "urdf": "Path of a URDF, beside this file.",
+    "urdf": "Path of a URDF, or of an MJCF, beside this file.",
     "base_placement": "Pose of the base in the world: x y z [m], quaternion x y z w.",
     "frames": "Frames of one's own by name, each a table: the pose that it has in that of a link.",
 }

@@ -220,8 +220,8 @@ def test_two_objects_of_one_name(tmp_path: Path) -> None:
 def test_other_files(tmp_path: Path) -> None:
     with pytest.raises(FileContentError, match=r"none.scene: No such file"):
         load_scene(tmp_path / "none.scene")
-    with pytest.raises(FileContentError, match=r"not a scene: the suffix must be .scene, .yaml"):
-        load_scene(tmp_path / "scene.world")
+    with pytest.raises(FileContentError, match=r"not a scene: the suffix must be one of .scene"):
+        load_scene(tmp_path / "scene.wrl")
     large = tmp_path / "large.scene"
     large.write_bytes(b"\n" * 20_000_001)
     with pytest.raises(FileContentError, match="larger than 20 MB"):

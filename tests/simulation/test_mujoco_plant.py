@@ -249,7 +249,7 @@ def test_a_model_of_ones_own_takes_no_payload(tmp_path: Path) -> None:
     world = World(load_arm("two_link"), Scene())
     with pytest.raises(InvalidValueError, match=r"payload = 1.0: must be a body of one's own MJCF"):
         own(tmp_path, world, disturbances=Disturbances(payload=1.0))
-    with pytest.raises(DensarmError, match="no such file"):
+    with pytest.raises(DensarmError, match="No such file"):
         MujocoPlant.from_mjcf(world, tmp_path / "none.xml")
 
 
