@@ -25,7 +25,7 @@ FARTHEST = 1e6
 _FLATNESS = 1e-6  # thickness, over the largest coordinate, of points that count as in one plane
 _THINNEST = 1e-9  # [m], likewise of points however near; of 1e-300 m Qhull ends the process
 _CELLS = 64  # along each side of a mesh whose hull is too fine for coal
-_KEPT = 512  # hulls, the last ones asked for
+_KEPT = 8192  # hulls, the last ones asked for
 
 
 def convex_hull(points: ArrayLike, name: str = "the set of points") -> coal.ConvexBase:

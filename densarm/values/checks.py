@@ -29,8 +29,8 @@ def finite_vector(name: str, value: ArrayLike, length: int, hint: str = "") -> A
 def positive_array(name: str, value: ArrayLike, length: int) -> Array:
     """Return one positive number, or `length` of them, as a new float array (length,)."""
     array = np.array(value, dtype=np.float64)
-    for entry in array.flat:
-        positive(name, entry)
+    for entry in array[~(np.isfinite(array) & (array > 0.0))].flat:
+        positive(name, entry)  # refuses the first
     if array.shape not in [(), (length,)]:
         raise InvalidValueError(name, value, f"a number or of shape ({length},)")
     return np.broadcast_to(array, (length,)).copy()

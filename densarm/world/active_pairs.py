@@ -12,7 +12,15 @@ from densarm.arms.dynamics import Kinematics
 from densarm.arms.joint_space import joint_error, sliding_joints
 from densarm.values.arrays import Array
 from densarm.values.kernels import any_vector, compiled, compiled_part, entry_point
-from densarm.world.pair_queries import PairQueries
+from densarm.world.pair_blocks import (
+    BLOCK,
+    block_left,
+    number_of_blocks,
+    pair_blocks,
+    rows_of,
+    write_block,
+)
+from densarm.world.pair_queries import BodyBalls, PairQueries, ball_gap
 from densarm.world.world import DISTANCE_TOLERANCE, World
 
 _ASLEEP, _AWAKE = 0, 1
@@ -98,12 +106,11 @@ class ActivePairs:
 
     def __init__(self, world: World, kinematics: Kinematics | None = None) -> None:
         self.world = world
-        arm, self._geometry = world.arm, world.geometry_model
+        arm = world.arm
         self._updates_kinematics = kinematics is None
         self.kinematics = kinematics or Kinematics(arm)
         """Placements and Jacobian at the last update."""
         self._queries = PairQueries(arm.model, world, remembers=False)
-        self._geometry_data = self._queries.data
         self.rows: Array = self._queries.rows
         """[distance, normal, point 1, point 2] (K, 10) [m]; old where a pair is asleep."""
         # Rows: awake, the version of `World.changes` that was queried, a workspace, awake pairs.
@@ -137,6 +144,7 @@ class ActivePairs:
             world.changes,
             world.obstacle_way,
             self._blocks,
+            self._queries.body_balls,
         )
         self._wake = entry_point(_wake, any_vector, *self._arrays)
         self.update(rest)  # kernels are loaded, or compiled, before a control loop
@@ -155,13 +163,10 @@ class ActivePairs:
         """Act as `DistanceBounds.query`, at the configuration of the last update."""
         if self.state[pair] == _AWAKE:
             return False
-        data = self._geometry_data
-        if not self.state.any():  # shapes were left where they were
-            self._place_shapes(data)
-        data.activateCollisionPair(pair)
+        self._queries.activate(pair, True)
         self._queries.ask(np.array([pair]))
         self.state[pair] = _AWAKE
-        self._blocks[pair // BLOCK, 0] = -np.inf
+        self._blocks[rows_of(pair, self.world.n_pairs), 0] = -np.inf
         self.distance[pair] = self.rows[pair, 0]
         return True
 
@@ -181,7 +186,9 @@ class ActivePairs:
 
     def update(self, q: Array) -> None:
         """Query the pairs that may be within reach at q (nq,), and some others."""
-        data = self._geometry_data
+        if self._updates_kinematics:
+            self.kinematics.update(q)
+        self._queries.place(self.kinematics.data)
         if self._version != self.world.version:
             self._version = self.world.version
             self.look_again()
@@ -189,19 +196,9 @@ class ActivePairs:
         self.n_awake = n_awake
         self._bounds = None
         for k in self._pair_states[2, :n_changed].tolist() if n_changed else ():
-            if k >= 0:
-                data.activateCollisionPair(k)
-            else:
-                data.deactivateCollisionPair(~k)
-        if self._updates_kinematics:
-            self.kinematics.update(q)
+            self._queries.activate(k if k >= 0 else ~k, k >= 0)
         if n_awake:
-            self._place_shapes(data)
             self._queries.ask_active(self.listed[:n_awake])
-
-    def _place_shapes(self, data: pin.GeometryData) -> None:
-        kinematics = self.kinematics
-        pin.updateGeometryPlacements(kinematics.model, kinematics.data, self._geometry, data)
 
 
 def joint_numbers(arm: Arm) -> Array:
@@ -221,7 +218,7 @@ def _first(margin: Array, rate: Array) -> tuple[float, int]:
 
 
 @compiled
-def _wake(
+def _wake(  # noqa: C901  # what is called at each level is compiled once more
     q: Array,
     q_last: Array,
     joint_index: NDArray[np.int64],
@@ -233,77 +230,59 @@ def _wake(
     changes: NDArray[np.int64],
     obstacle_way: Array,
     blocks: Array,
+    balls: BodyBalls | None,
 ) -> tuple[int, int]:
     """Decide which pairs are awake at q; return how many, and how many changed.
 
     Into the last rows of `pair_states` go the indices of pairs that wake, and the complements of
-    those that fall asleep, and then all that are awake.
+    those that fall asleep, and then all that are awake. Pairs that are not awake sleep on where
+    balls around their bodies, if those are told, are far apart.
     """
-    reach, level, moved = pair_numbers[0], pair_numbers[1], pair_numbers[2]
     state, seen, changed, listed = pair_states[0], pair_states[1], pair_states[2], pair_states[3]
+    reach, level, moved = pair_numbers[0], pair_numbers[1], pair_numbers[2]
     wakes_all = not go(q, q_last, joint_index, joint_numbers)
     way, step = joint_numbers[0], joint_numbers[1]
-    n_awake, n_changed = 0, 0
-    for block in range(blocks.shape[0]):
-        if block_left(blocks, block, way) > 0.0 and not wakes_all:
+    n_awake, n_changed, n_blocks = 0, 0, number_of_blocks(state.shape[0])
+    for group in range(blocks.shape[0] - n_blocks):
+        if block_left(blocks, n_blocks + group, way) > 0.0 and not wakes_all:
             continue
-        left = np.inf
-        for k in range(block * BLOCK, min((block + 1) * BLOCK, state.shape[0])):
-            before, now, change = state[k], _AWAKE, changes[k]
-            if change < 0:  # spare
-                now, level[k] = _ASLEEP, np.inf
-            elif change == seen[k] and not wakes_all:
-                by_joints = pair_motion(lipschitz, k, way)
-                if before == _AWAKE:
-                    level[k] = rows[k, 0] + (by_joints - pair_motion(lipschitz, k, step)) + moved[k]
-                gone = by_joints + obstacle_way[k]
-                # A sleep of a few steps saves nothing, but pairs so close to their reach are few.
-                if level[k] - gone > reach[k] + 2.0 * DISTANCE_TOLERANCE:
-                    now = _ASLEEP
-            state[k], seen[k], moved[k] = now, change, obstacle_way[k]
-            if now == _AWAKE:
-                listed[n_awake], left = k, -np.inf
-                n_awake += 1
-            else:
-                gone = pair_motion(lipschitz, k, way) + obstacle_way[k]
-                left = min(left, level[k] - gone - reach[k] - 2.0 * DISTANCE_TOLERANCE)
-            if now != before:
-                changed[n_changed] = k if now == _AWAKE else ~k
-                n_changed += 1
-        write_block(blocks, block, left, way)
+        group_left = np.inf
+        for block in range(group * BLOCK, min((group + 1) * BLOCK, n_blocks)):
+            left = block_left(blocks, block, way)
+            if not left > 0.0 or wakes_all:
+                # What is left of all of them is found anew where that ran out.
+                is_spent, left = left > -np.inf, np.inf
+                for k in range(block * BLOCK, min((block + 1) * BLOCK, state.shape[0])):
+                    before, now, change = state[k], _AWAKE, changes[k]
+                    by_joints = pair_motion(lipschitz, k, way)
+                    gone, enough = by_joints + obstacle_way[k], reach[k] + 2.0 * DISTANCE_TOLERANCE
+                    if change < 0:  # spare
+                        level[k] = np.inf
+                    elif change != seen[k] or wakes_all:
+                        level[k] = -np.inf
+                    elif before == _AWAKE:
+                        last = pair_motion(lipschitz, k, step)
+                        level[k] = rows[k, 0] + (by_joints - last) + moved[k]
+                    is_low = is_spent or not level[k] - gone > enough
+                    is_exact = before == _AWAKE and level[k] > -np.inf
+                    if balls is not None and is_low and not is_exact:
+                        level[k] = max(level[k], ball_gap(balls, k) + gone)
+                    # A sleep of a few steps saves nothing, but pairs so close to it are few.
+                    if change < 0 or level[k] - gone > enough:
+                        now = _ASLEEP
+                    state[k], seen[k], moved[k] = now, change, obstacle_way[k]
+                    if now == _AWAKE:
+                        listed[n_awake], left = k, -np.inf
+                        n_awake += 1
+                    else:
+                        left = min(left, level[k] - gone - enough)
+                    if now != before:
+                        changed[n_changed] = k if now == _AWAKE else ~k
+                        n_changed += 1
+                write_block(blocks, block, left, way)
+            group_left = min(group_left, left)
+        write_block(blocks, n_blocks + group, group_left, way)
     return n_awake, n_changed
-
-
-BLOCK = 32
-"""Pairs of a block, which are passed over together where none can be near."""
-
-
-def pair_blocks(lipschitz: Array) -> Array:
-    """Return a row for each block of pairs (B, 1 + 2 nv), given Lipschitz constants (K, nv).
-
-    It has minus infinity, since nothing is known of their distances, the largest of each constant,
-    and the way that the joints had gone when something was known.
-    """
-    starts = np.arange(0, len(lipschitz), BLOCK)
-    largest = np.maximum.reduceat(lipschitz, starts) if len(starts) else lipschitz
-    return np.column_stack([np.full(len(starts), -np.inf), largest, np.zeros_like(largest)])
-
-
-@compiled_part
-def block_left(blocks: Array, block: int, way: Array) -> float:
-    """Return what is left of a block's least distance after the joints have gone a way (nv,)."""
-    left: float = blocks[block, 0]
-    for j in range(way.shape[0]):
-        left -= blocks[block, 1 + j] * (way[j] - blocks[block, 1 + way.shape[0] + j])
-    return left
-
-
-@compiled_part
-def write_block(blocks: Array, block: int, left: float, way: Array) -> None:
-    """Write what is left of a block's least distance [m] after the joints have gone a way (nv,)."""
-    blocks[block, 0] = left
-    for j in range(way.shape[0]):
-        blocks[block, 1 + way.shape[0] + j] = way[j]
 
 
 @compiled_part

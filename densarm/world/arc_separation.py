@@ -11,6 +11,7 @@ from densarm.values.kernels import compiled_lean_part, compiled_part
 from densarm.world.bodies import BALL, BOX, RADIUS, Bodies, place, write_motion_bounds
 from densarm.world.cloud_field import Arc, CloudSpace, Fields, field_bound, new_cloud_space
 from densarm.world.cloud_separation import meets_again, unproved_halves
+from densarm.world.obstacle_tree import ObstacleTree
 from densarm.world.separation import climb, separation, stays_apart
 from densarm.world.simplex import Integers
 
@@ -31,11 +32,16 @@ class Memory(NamedTuple):
     """Corners of each pair (K, 4, 2) by which a plane was found, see `separation`; of a link and a
     cloud see `unproved_halves`."""
     order: Integers
-    """The pairs in the order in which they are looked at; one that was not clear is put first."""
+    """The pairs in the order in which they are looked at; one that was not clear is put first. Of
+    very many pairs some that were not clear lately."""
     planes: Array
     """Planes between each link and cloud (K, 6, 10), see `PLANES`."""
+    gaps: Array
+    """Of each pair a normal, and the gap that its plane leaves (K, 4) [m]."""
     fields: Fields
     """How far places are from clouds."""
+    tree: ObstacleTree
+    """What finds the others of very many pairs."""
 
 
 class ArcSpace(NamedTuple):
@@ -52,7 +58,7 @@ class ArcSpace(NamedTuple):
     is_asked: NDArray[np.bool_]
     """Which bodies are of pairs that are not proved (S,)."""
     planes: Array
-    """Of each pair a normal, and the gap that its plane leaves (K, 4) [m]."""
+    """As `Memory.gaps`."""
     work: Array
     """See `separation` (8, 4)."""
     cloud: CloudSpace
@@ -60,15 +66,15 @@ class ArcSpace(NamedTuple):
 
 
 @compiled_part
-def new_arc_space(n_joints: int, n_bodies: int, n_pairs: int) -> ArcSpace:
-    """Return space for so many joints, of which the first is the world, bodies and pairs."""
+def new_arc_space(n_joints: int, n_bodies: int, gaps: Array) -> ArcSpace:
+    """Return space for so many joints, of which the first is the world, and bodies."""
     return ArcSpace(
         np.empty(n_joints - 1),
         np.empty((3, n_joints, 12)),
         np.empty((3, n_bodies, 12)),
         np.empty((2, n_bodies, n_joints)),
         np.empty(n_bodies, np.bool_),
-        np.empty((n_pairs, 4)),
+        gaps,
         np.empty((8, 4)),
         new_cloud_space(),
     )

@@ -120,8 +120,8 @@ def _bodies(world: World) -> tuple[Bodies, Integers]:
     box = 0.5 * (high - low) + radius[:, np.newaxis]
     joint = np.array([item.parentJoint for item in shapes], dtype=np.int64)
     supports = [set(above) for above in model.supports]
-    shared = [max(supports[a] & supports[b]) for a, b in joint[world.pair_shapes]]
-    last = np.array(shared, dtype=np.int64)
+    shared = np.array([[max(a & b) for b in supports] for a in supports], dtype=np.int64)
+    last = shared[joint[world.pair_shapes[:, 0]], joint[world.pair_shapes[:, 1]]]
     is_first = joint[world.pair_shapes[:, :1]] == last[:, np.newaxis]
     pairs = np.where(is_first, world.pair_shapes[:, ::-1], world.pair_shapes)
     covers = [

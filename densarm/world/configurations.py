@@ -63,7 +63,7 @@ def clear_configurations(
     def draw() -> Array:
         for _ in range(_DRAWS):
             q = arm.configurations(random.uniform(lower, upper))
-            if world.distances(q).min(initial=np.inf) > margin:
+            if world.distances_within(q, margin).min(initial=np.inf) > margin:
                 return q
         raise DensarmError(
             f"robot {arm.name!r}: none of {_DRAWS} random configurations keeps "
@@ -95,17 +95,19 @@ def _holding_faults(arm: Arm, q: Array) -> Iterator[str]:
 
 
 def _contact_faults(check: SweptCheck, q: Array) -> Iterator[str]:
-    distance, pairs = check.world.distances(q), check.world.pairs
+    distance = check.world.distances_within(q, check.margin)
     clouds = {slot.obstacle.name: list[int]() for slot in check.world.clouds}
-    for k in np.argsort(distance)[: int((distance <= check.margin).sum())].tolist():
-        if distance[k] <= 0.0 and pairs[k][1] in clouds:
-            clouds[pairs[k][1]].append(k)
+    near = np.flatnonzero(distance <= check.margin)
+    for k in near[np.argsort(distance[near])].tolist():
+        names, gap = check.world.pair_names(k), distance[k] * 1e3
+        if gap <= 0.0 and names[1] in clouds:
+            clouds[names[1]].append(k)
             continue
-        pair, gap = " and ".join(pairs[k]), distance[k] * 1e3
+        pair = " and ".join(names)
         yield f"{pair} overlap by {-gap:.3g} mm" if gap <= 0.0 else f"{pair} are {gap:.3g} mm apart"
     for name, inside in clouds.items():
         if inside:
-            links = ", ".join(pairs[k][0] for k in inside[:_TOLD])
+            links = ", ".join(check.world.pair_names(k)[0] for k in inside[:_TOLD])
             more = f" and {len(inside) - _TOLD} more" if len(inside) > _TOLD else ""
             gap = 1e3 * distance[inside[0]]
             hint = "are its points the arm's own? A CloudFilter takes them out"

@@ -35,8 +35,7 @@ class DistanceView:
         strided = self._strided()
         self.is_direct = strided is not None
         """Whether `read` costs no copy."""
-        count = len(self._results)
-        self._copies = np.zeros((count + 1, 2 * _FIELDS))[:count, :_FIELDS]
+        self._copies = empty_rows(len(self._results))
         self._rows = self._copies.view() if strided is None else strided
         self._rows.flags.writeable = False  # alike, for kernels, however they are read
 
@@ -75,23 +74,30 @@ class DistanceView:
         return np.array(rows, dtype=np.float64).reshape(-1, _FIELDS)
 
 
+def empty_rows(count: int) -> Array:
+    """Return rows for as many pairs, laid out alike for kernels."""
+    return np.zeros((count + 1, 2 * _FIELDS))[:count, :_FIELDS]
+
+
 def shape_positions(geometry_data: pin.GeometryData) -> Array:
     """Return the positions of all shapes' frames (S, 3) [m] as a view, to be read and written.
 
     They are members of the elements of one C++ vector.
     """
-    return _members([placement.translation for placement in geometry_data.oMg])
+    return _members(geometry_data.oMg, "translation")
 
 
 def shape_rotations(geometry_data: pin.GeometryData) -> Array:
     """Return the rotations of all shapes' frames (S, 3, 3) likewise."""
-    return _members([placement.rotation for placement in geometry_data.oMg])
+    return _members(geometry_data.oMg, "rotation")
 
 
-def _members(views: list[Array]) -> Array:
-    begin = [view.__array_interface__["data"][0] for view in views[:2]]
+def _members(placements: pin.StdVec_SE3, name: str) -> Array:
+    count = len(placements)
+    views = [getattr(placements[k], name) for k in range(min(count, 2))]
+    begin = [view.__array_interface__["data"][0] for view in views]
     strides = (begin[-1] - begin[0], *views[0].strides)
-    return np.lib.stride_tricks.as_strided(views[0], (len(views), *views[0].shape), strides)
+    return np.lib.stride_tricks.as_strided(views[0], (count, *views[0].shape), strides)
 
 
 @compiled

@@ -1,19 +1,22 @@
 """NearPairs: the distances of the pairs that may be near, at one configuration after another."""
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
 from densarm.values.arrays import Array
 from densarm.values.kernels import compiled
-from densarm.world.active_pairs import (
+from densarm.world.active_pairs import go, joint_numbers, pair_motion
+from densarm.world.pair_blocks import (
     BLOCK,
     block_left,
-    go,
-    joint_numbers,
+    forget_pair,
+    number_of_blocks,
     pair_blocks,
-    pair_motion,
     write_block,
 )
+from densarm.world.pair_slots import N_SLOTS
 from densarm.world.world import DISTANCE_TOLERANCE, Pairs, World
 
 _SLACK = 0.02  # [m] beyond the smallest distance, up to which pairs are asked that may soon have it
@@ -43,11 +46,11 @@ class NearPairs:
         self._asked = np.zeros((3, world.n_pairs), np.int64)
         rest = world.arm.configurations(np.zeros(world.arm.nv))
         index, joints = world.arm.joint_index, joint_numbers(world.arm)
-        self._arrays = (
-            *(rest, index, world.lipschitz, joints, self._numbers, self._asked),
+        self._blocks, self._version = pair_blocks(world.lipschitz), 0
+        self._arrays: tuple[Any, ...] = (
+            *(self._blocks, rest, index, world.lipschitz, joints, self._numbers, self._asked),
             *(world.changes, world.obstacle_way),
         )
-        self._blocks, self._version = pair_blocks(world.lipschitz), 0
         self._question = 0
 
     def below(self, q: Array, limit: float | Array) -> tuple[Pairs, Array]:
@@ -81,8 +84,12 @@ class NearPairs:
             self._version = world.version
             self._blocks[:, 0] = -np.inf
         most = float(np.max(limit, initial=-np.inf))
-        count = _may_be_below(q, self._limit, most, self._question, self._blocks, *self._arrays)
+        count = _may_be_below(q, self._limit, most, self._question, *self._arrays)
         pairs = self._asked[1, :count]
+        if count > N_SLOTS:  # of which is found out first which are far
+            bounds = world.bounds(q, pairs)
+            n_near = _learn_far(bounds, self._asked, self._limit, numbers, self._blocks)
+            pairs = pairs[:n_near]
         rows = world.query(q, pairs)
         return pairs, rows, _learn(rows, pairs, numbers, self._blocks)
 
@@ -130,23 +137,52 @@ def _may_be_below(
 ) -> int:
     """Go on to q; write which pairs have not been asked for a question, and are to be: how many."""
     level, gone, count = numbers[0], numbers[1], 0
-    holds = go(q, q_last, joint_index, joints)
-    for block in range(blocks.shape[0]):
-        if holds and block_left(blocks, block, joints[0]) - 2.0 * DISTANCE_TOLERANCE >= most:
+    holds, way = go(q, q_last, joint_index, joints), joints[0]
+    n_blocks = number_of_blocks(level.shape[0])
+    for group in range(blocks.shape[0] - n_blocks):
+        if holds and block_left(blocks, n_blocks + group, way) - 2.0 * DISTANCE_TOLERANCE >= most:
             continue
-        least = np.inf
-        for k in range(block * BLOCK, min((block + 1) * BLOCK, level.shape[0])):
-            if changes[k] < 0:  # spare
-                level[k] = np.inf
-            elif not holds or changes[k] != asked[2, k]:
-                level[k] = -np.inf
-            asked[2, k] = changes[k]
-            gone[k] = pair_motion(lipschitz, k, joints[0]) + obstacle_way[k]
-            least = min(least, level[k] - gone[k])
-            if asked[0, k] != question and level[k] - gone[k] - 2.0 * DISTANCE_TOLERANCE < limit[k]:
-                asked[0, k], asked[1, count] = question, k
-                count += 1
-        write_block(blocks, block, least, joints[0])
+        group_least = np.inf
+        for block in range(group * BLOCK, min((group + 1) * BLOCK, n_blocks)):
+            least = block_left(blocks, block, way)
+            if not holds or least - 2.0 * DISTANCE_TOLERANCE < most:
+                least = np.inf
+                for k in range(block * BLOCK, min((block + 1) * BLOCK, level.shape[0])):
+                    if changes[k] < 0:  # spare
+                        level[k] = np.inf
+                    elif not holds or changes[k] != asked[2, k]:
+                        level[k] = -np.inf
+                    asked[2, k] = changes[k]
+                    gone[k] = pair_motion(lipschitz, k, way) + obstacle_way[k]
+                    bound = level[k] - gone[k]
+                    least = min(least, bound)
+                    if asked[0, k] != question and bound - 2.0 * DISTANCE_TOLERANCE < limit[k]:
+                        asked[0, k], asked[1, count] = question, k
+                        count += 1
+                write_block(blocks, block, least, way)
+            group_least = min(group_least, least)
+        write_block(blocks, n_blocks + group, group_least, way)
+    return count
+
+
+@compiled
+def _learn_far(
+    bounds: Array,
+    asked: NDArray[np.int64],
+    limit: Array,
+    numbers: Array,
+    blocks: Array,
+) -> int:
+    """Bound distances of pairs by balls around their bodies; keep and count those that are near."""
+    count = 0
+    for n in range(bounds.size):
+        k = asked[1, n]
+        forget_pair(blocks, k, numbers.shape[1])  # to be found anew
+        if bounds[n] < limit[k]:
+            asked[1, count] = k
+            count += 1
+        else:
+            asked[0, k], numbers[0, k] = 0, bounds[n] + numbers[1, k]
     return count
 
 
@@ -156,7 +192,7 @@ def _learn(rows: Array, pairs: Pairs, numbers: Array, blocks: Array) -> tuple[fl
     smallest, nearest = np.inf, -1
     for k in pairs:
         numbers[0, k] = rows[k, 0] + numbers[1, k]
-        blocks[k // BLOCK, 0] = -np.inf  # to be found anew
+        forget_pair(blocks, k, numbers.shape[1])  # to be found anew
         if rows[k, 0] < smallest:
             smallest, nearest = rows[k, 0], k
     return smallest, nearest

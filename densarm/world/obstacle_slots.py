@@ -16,7 +16,11 @@ from densarm.scene.scene import Scene
 from densarm.values.arrays import Array
 from densarm.values.checks import finite_number, non_negative
 from densarm.world.hulls import Hulls, hulls_of
-from densarm.world.placed_obstacle import PlacedObstacle, checked_velocity
+from densarm.world.placed_obstacle import (
+    PlacedObstacle,
+    checked_velocity,
+    enclosing_ball,
+)
 
 _LONGEST_WAY = 1e4  # [m], beyond which sums of small steps would round off too much
 
@@ -26,6 +30,7 @@ class ChangingObstacles:
 
     Args:
         geometry_model: holds the obstacles' shapes last, in their order.
+        links: its other shapes alone, which the joints move.
         pair_shapes: indices of the two shapes of each pair (K, 2).
         scene: the obstacles, all of them present.
         counts: how many shapes each of them has.
@@ -35,12 +40,13 @@ class ChangingObstacles:
     def __init__(
         self,
         geometry_model: pin.GeometryModel,
+        links: pin.GeometryModel,
         pair_shapes: NDArray[np.int64],
         scene: Scene,
         counts: Sequence[int],
         origin: Array,
     ) -> None:
-        self.geometry_model = geometry_model
+        self.geometry_model, self.links = geometry_model, links
         self.pair_shapes = pair_shapes
         """Indices of the two shapes of each pair (K, 2) in the geometry model."""
         self.version = 1
@@ -55,6 +61,9 @@ class ChangingObstacles:
         """Velocity of each pair's obstacle (K, 6): of its point at `Arm.origin` [m/s], and angular
         [rad/s], both in the world frame."""
         self._shapes = list(geometry_model.geometryObjects)
+        self.balls: Array = np.array([enclosing_ball(item.geometry) for item in self._shapes])
+        """Balls around all shapes (S, 4), in their frames: middle, and radius, which is infinite
+        for what has no end, and for clouds, of which a shape is one point [m]."""
         self.spare_is_known = False
         """Whether those who skip spare pairs know of the last one."""
         self._attachments = scene.attachments
@@ -69,8 +78,8 @@ class ChangingObstacles:
         for obstacle, count in zip(scene, counts, strict=True):
             begin, end = end, end + count
             pairs = slice(*np.searchsorted(last, [begin, end]).tolist())
-            ways, twists = self.obstacle_way[pairs], self.twist[pairs]
-            slot = PlacedObstacle(self._shapes[begin:end], pairs, ways, twists)
+            own = self.obstacle_way[pairs], self.twist[pairs], self.balls[begin:end]
+            slot = PlacedObstacle(self._shapes[begin:end], pairs, *own)
             slot.hold(obstacle, self._origin)
             self.has_motion[pairs] = obstacle.motion is not None
             self._present[obstacle.name] = slot
@@ -114,6 +123,11 @@ class ChangingObstacles:
             names = [item.name for item in self._shapes]
             self._pairs = tuple((names[i], names[j]) for i, j in self.pair_shapes)
         return self._pairs
+
+    def pair_names(self, pair: int) -> tuple[str, str]:
+        """Return the names of the two bodies of one pair, as `pairs` has them."""
+        first, second = self.pair_shapes[pair]
+        return self._shapes[first].name, self._shapes[second].name
 
     def require_version(self, version: int) -> None:
         """Refuse what was computed before a change to the obstacles.

@@ -4,6 +4,7 @@ import math
 from dataclasses import fields, replace
 from typing import Any, TypeGuard
 
+import coal
 import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike
@@ -28,16 +29,22 @@ class PlacedObstacle:
         pairs: where the pairs are among all.
         ways: their part of `ChangingObstacles.obstacle_way`, written to.
         twists: and of `ChangingObstacles.twist`.
+        balls: and of `ChangingObstacles.balls`.
     """
 
     obstacle: Obstacle
 
     def __init__(
-        self, shapes: list[pin.GeometryObject], pairs: slice, ways: Array, twists: Array
+        self,
+        shapes: list[pin.GeometryObject],
+        pairs: slice,
+        ways: Array,
+        twists: Array,
+        balls: Array,
     ) -> None:
         self.shapes = shapes
         self.pairs = pairs
-        self._ways, self._twists = ways, twists
+        self._ways, self._twists, self._balls = ways, twists, balls
         self.gone = 0.0
         """As the ways [m]."""
         self.pose = np.zeros(7)
@@ -67,6 +74,9 @@ class PlacedObstacle:
                 shape.geometry.radius = obstacle.radius
             if isinstance(obstacle, Capsule):
                 shape.geometry.halfLength = 0.5 * obstacle.length
+            self._balls[k] = enclosing_ball(shape.geometry)
+        if isinstance(obstacle, PointCloud):
+            self._balls[:, 3] = math.inf
         pose = np.array([*obstacle.position, *obstacle.orientation_xyzw])
         self.put(pose - origin, obstacle.velocity_at(0.0), None)
         self.gone = self._ways[:] = 0.0
@@ -123,6 +133,13 @@ class PlacedObstacle:
             self._track[_COUNT] = 0.0
         _write_twists(pose, self.velocity, self._twists)
         return way
+
+
+def enclosing_ball(shape: coal.CollisionGeometry) -> Array:
+    """Return the middle in its frame and the radius of a ball around a shape (4,) [m]."""
+    shape.computeLocalAABB()
+    ball = np.array([*shape.aabb_center, shape.aabb_radius])
+    return ball if ball[3] < FARTHEST else np.array([0.0, 0.0, 0.0, math.inf])
 
 
 def _is_vector(value: object, size: int) -> TypeGuard[Array]:

@@ -6,17 +6,20 @@ import numpy as np
 
 from densarm.values.arrays import Array
 from densarm.values.checks import non_negative
-from densarm.values.kernels import compiled, entry_point
+from densarm.values.kernels import compiled, compiled_part, entry_point
 from densarm.world.arc_separation import (
     NOTHING,
+    ArcSpace,
     Memory,
     is_met_again,
     new_arc_space,
     write_unproved,
 )
-from densarm.world.bodies import Bodies, bodies_of
+from densarm.world.bodies import Bodies, bodies_of, place, write_motion_bounds
 from densarm.world.cloud_field import fields_of
 from densarm.world.cloud_separation import PLANES
+from densarm.world.obstacle_tree import ObstacleTree, found_pairs, obstacle_tree, write_least
+from densarm.world.simplex import Integers
 from densarm.world.world import DISTANCE_TOLERANCE, World
 
 _FLOOR = 1e-4  # [rad or m], length of a segment at which one not proved clear counts as not clear
@@ -91,9 +94,15 @@ class SeparatingPlanes:
         corners[:, 0] = some_corner
         order = np.flatnonzero(world.changes > 0)
         planes = np.full((world.n_pairs if world.clouds else 0, *PLANES), np.inf)
-        self._memory = Memory(corners, order, planes, fields_of(world))
+        tree = obstacle_tree(world, self._least)
+        self._is_large = len(tree.bodies) > 0
+        if self._is_large:
+            order = tree.found[: min(_FIRST, tree.n_always)].copy()
+        gaps = np.empty((world.n_pairs, 4))
+        self._memory = Memory(corners, order, planes, gaps, fields_of(world), tree)
         # Loaded, or compiled, here rather than where a plan's time is taken.
-        types = self._bodies, self._memory, self._least, np.zeros((2, world.arm.nv))
+        rest, still = np.zeros((2, world.arm.nv)), np.zeros(world.arm.nv)
+        types = self._bodies, self._memory, self._least, still, rest
         self._kernel = entry_point(_polyline_is_clear, *types)
         self.asked = 0
         """How many questions it was asked."""
@@ -110,7 +119,7 @@ class SeparatingPlanes:
             q_b: the other end (nq,), reached the short way round on continuous joints.
         """
         arm = self._world.arm
-        return self._is_clear(_ends(arm.angles(q_a), arm.difference(q_a, q_b)), self._least)
+        return self._is_clear(_ends(arm.angles(q_a), arm.difference(q_a, q_b)))
 
     def polyline_is_clear(self, angles: Array) -> bool:
         """Return whether every distance is proved above the margin on a whole polyline.
@@ -119,17 +128,20 @@ class SeparatingPlanes:
             angles: joint positions that it goes through (N, nv) [rad or m], N >= 2; continuous
                 joints count their turns.
         """
-        return self._is_clear(np.ascontiguousarray(angles, np.float64), self._least)
+        return self._is_clear(np.ascontiguousarray(angles, np.float64))
 
     def tube_is_clear(self, tube: Tube) -> bool:
         """Return whether every distance is proved above the margin in all of a tube."""
-        least = self._least + self._world.lipschitz @ tube.radius
-        return self._is_clear(_ends(tube.begin, tube.step), least)
+        return self._is_clear(_ends(tube.begin, tube.step), tube.radius)
 
-    def _is_clear(self, angles: Array, least: Array) -> bool:
+    def _is_clear(self, angles: Array, radius: Array | None = None) -> bool:
         self._world.require_version(self._version)
         self.asked += 1
-        return bool(self._kernel(self._bodies, self._memory, least, angles))
+        off = np.zeros(angles.shape[1]) if radius is None else radius
+        least = self._memory.tree.least if self._is_large else self._least
+        if radius is not None and not self._is_large:
+            least = least + self._world.lipschitz @ radius
+        return bool(self._kernel(self._bodies, self._memory, least, off, angles))
 
 
 def _ends(begin: Array, step: Array) -> Array:
@@ -137,18 +149,24 @@ def _ends(begin: Array, step: Array) -> Array:
 
 
 @compiled
-def _polyline_is_clear(bodies: Bodies, memory: Memory, least: Array, points: Array) -> bool:
+def _polyline_is_clear(
+    bodies: Bodies, memory: Memory, least: Array, radius: Array, points: Array
+) -> bool:
     """Prove all pairs on a polyline, on all of it those first that were not clear lately.
 
     Args:
         bodies: the bodies.
         memory: which pairs to prove, and what helps.
-        least: distance that each pair must exceed (K,) [m].
+        least: distance that each pair must exceed (K,) [m]; of very many that of the tree.
+        radius: how far each joint may be off the polyline (nv,) [rad or m].
         points: joint positions that it goes through (N, nv) [rad or m].
     """
-    space = new_arc_space(bodies.parent.size, bodies.joint.size, least.size)
+    space = new_arc_space(bodies.parent.size, bodies.joint.size, memory.gaps)
     step = space.step
     n_segments, first = points.shape[0] - 1, memory.order[:_FIRST]
+    is_large = memory.tree.links.size > 0
+    if is_large:
+        write_least(memory.tree, first, radius)
     for part in range(3 * n_segments):
         stage, off = part // n_segments, part % n_segments
         # From the middle on: what is new about a way is clear at its ends as a rule.
@@ -162,6 +180,8 @@ def _polyline_is_clear(bodies: Bodies, memory: Memory, least: Array, points: Arr
                 return False
             continue
         order = first if stage == 1 else memory.order[_FIRST:]
+        if is_large and stage == 2:
+            order = _found(bodies, memory.tree, radius, angles, space)
         # Pairs, arcs on which they are not proved, and what is known of them there.
         waiting = np.empty((order.size, 3), np.int64)
         for n in range(order.size):
@@ -175,3 +195,18 @@ def _polyline_is_clear(bodies: Bodies, memory: Memory, least: Array, points: Arr
             waiting = halves[:written]
             share *= 0.5
     return True
+
+
+@compiled_part
+def _found(
+    bodies: Bodies, tree: ObstacleTree, radius: Array, angles: Array, space: ArcSpace
+) -> Integers:
+    """Return which of very many pairs may touch on a segment, and write what they must exceed."""
+    joint_pose, pose, is_asked = space.joint_poses[1], space.poses[1], space.is_asked
+    for body in range(is_asked.size):
+        is_asked[body] = bodies.joint[body] > 0
+    place(bodies, angles, space.step, 0.5, is_asked, joint_pose, pose)
+    write_motion_bounds(bodies, space.step, 1.0, is_asked, joint_pose, pose, space.bounds)
+    pairs = found_pairs(tree, bodies, pose, space.bounds[0], radius)
+    write_least(tree, pairs, radius)
+    return pairs

@@ -12,6 +12,7 @@ from densarm.values.arrays import Array
 from densarm.values.checks import non_negative
 from densarm.world.world import DISTANCE_TOLERANCE, Pairs, World
 
+_SEEN = 0.3  # [m], up to which margins of many thousands of pairs are no mere bounds
 _DEPTH_FLOOR = 1e-5  # [rad or m], a shorter segment that is still not proved counts as not clear
 
 
@@ -77,9 +78,9 @@ class SweptCheck:
             q: configuration (nq,).
             pairs: indices of the pairs to look at; None for all, (K,).
         """
-        return self.world.distances(q, pairs) - (
-            self._least if pairs is None else self._least[pairs]
-        )
+        least = self._least if pairs is None else self._least[pairs]
+        limit = _SEEN + float(least.max(initial=0.0))
+        return self.world.distances_within(q, limit, pairs) - least
 
     def least_distance_margin(self, q: Array) -> float:
         """Return the smallest distance margin [m] at configurations (N, nq); infinite of none."""
@@ -185,7 +186,7 @@ class SweptCheck:
     def _result(
         self, verdict: SweptVerdict, met: dict[float, float], at: float, failing: Pairs
     ) -> SweptResult:
-        pairs = tuple(self.world.pairs[k] for k in failing)
+        pairs = tuple(map(self.world.pair_names, failing))
         return SweptResult(verdict, int(at), pairs, np.unique(list(met)), min(met.values()))
 
 

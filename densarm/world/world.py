@@ -14,7 +14,7 @@ from densarm.arms.dynamics import by_columns, holding_ratios, holding_torque
 from densarm.arms.inverse_kinematics import InverseKinematics
 from densarm.arms.pose import Pose
 from densarm.errors import DensarmError, InvalidValueError
-from densarm.scene.obstacles import Obstacle, geometry_objects, numbered
+from densarm.scene.obstacles import Obstacle, geometry_objects
 from densarm.scene.point_cloud import PointCloud
 from densarm.scene.scene import Scene
 from densarm.values.arrays import Array
@@ -22,6 +22,7 @@ from densarm.values.checks import non_negative, non_negative_integer, positive_i
 from densarm.values.documented import documented
 from densarm.world.cloud_balls import nearest_ball
 from densarm.world.distance_view import add_pair_gradients, pair_rates
+from densarm.world.geometry_model import geometry_model
 from densarm.world.lipschitz import joint_support, shape_lipschitz
 from densarm.world.obstacle_slots import ChangingObstacles
 from densarm.world.pair_queries import PairQueries
@@ -98,10 +99,10 @@ class World(ChangingObstacles):
     def __init__(self, arm: Arm, scene: Scene, spare: Iterable[Obstacle] = ()) -> None:
         self.arm = arm
         reserve = Scene([*scene, *spare], scene.attachments)
-        model, counts = _geometry_model(arm, reserve)
+        model, counts = geometry_model(arm, reserve)
         pair_shapes = [(pair.first, pair.second) for pair in model.collisionPairs]
         indices = np.array(pair_shapes, dtype=np.int64).reshape(-1, 2)
-        super().__init__(model, indices, reserve, counts, arm.origin)
+        super().__init__(model, arm.collision_model, indices, reserve, counts, arm.origin)
         self.n_pairs = len(pair_shapes)
         self._queries = PairQueries(arm.model, self, remembers=True)
         self._geometry_data, self._data = self._queries.data, arm.model.createData()
@@ -160,6 +161,27 @@ class World(ChangingObstacles):
         rows = self.query(q, pairs)
         asked = slice(None) if pairs is None else pairs
         return np.where(self._is_spare[asked], np.inf, rows[asked, 0])
+
+    def distances_within(self, q: Array, limit: float, pairs: Pairs | None = None) -> Array:
+        """Return what `distances` does, of many thousands of pairs only as far as they matter.
+
+        Those beyond a limit [m] may be lower bounds then, above the limit too.
+        """
+        if self._queries.body_balls is None:
+            return self.distances(q, pairs)
+        asked = np.arange(self.n_pairs) if pairs is None else pairs
+        found = self.bounds(q, asked)
+        is_near = found <= limit
+        found[is_near] = self._measured(asked[is_near])[asked[is_near], 0]
+        return found
+
+    def bounds(self, q: Array, pairs: Pairs) -> Array:
+        """Return lower bounds of the distances of pairs (P,), by balls around bodies [m]."""
+        pin.forwardKinematics(self.arm.model, self._data, q)
+        self._queries.place(self._data)
+        found = self._queries.bounds(pairs)
+        found[self.changes[pairs] < 0] = np.inf
+        return found
 
     def query(self, q: Array, pairs: Pairs | None = None) -> Array:
         """Return what coal tells of pairs, without a copy and without checks.
@@ -243,15 +265,18 @@ class World(ChangingObstacles):
 
     def _keeps(self, q: Array, margin: float) -> bool:
         """Return whether all pairs are farther apart than a margin [m] at q (nq,)."""
-        if margin > 0.0 or not self.spare_is_known or self.clouds:
-            return bool(self.distances(q).min(initial=np.inf) > margin)
+        whole = self.spare_is_known and not self.clouds and self._queries.body_balls is None
+        if margin > 0.0 or not whole:
+            return bool(self.distances_within(q, margin).min(initial=np.inf) > margin)
         # Takes a quarter of the time that distances take.
         model, data = self.geometry_model, self._geometry_data
         return not pin.computeCollisions(self.arm.model, self._data, model, data, q, True)
 
     def _fault(self, tried: Array, margin: float) -> str:
         """Return, as a phrase, what is wrong at the best of configurations (N, nq)."""
-        distances = np.array([self.distances(q) for q in tried]).reshape(len(tried), -1)
+        distances = np.array([self.distances_within(q, margin) for q in tried]).reshape(
+            len(tried), -1
+        )
         least = distances.min(axis=1, initial=np.inf)
         best = int(least.argmax())
         gap, ways = 1e3 * float(least[best]), f"all {len(tried)} ways to reach it that were tried"
@@ -282,10 +307,9 @@ class World(ChangingObstacles):
 
     def _measured(self, pairs: Pairs | None = None) -> Array:
         """Return the rows of `DistanceView`, new for some pairs or all."""
-        model, data = self.geometry_model, self._geometry_data
         if not self.spare_is_known:
             self._skip_spare_pairs()
-        pin.updateGeometryPlacements(self.arm.model, self._data, model, data)
+        self._queries.place(self._data)
         if pairs is not None and len(pairs) < self.n_pairs:
             self._queries.ask(pairs)
         elif not self._is_spare.all():
@@ -295,10 +319,7 @@ class World(ChangingObstacles):
     def _skip_spare_pairs(self) -> None:
         is_spare, self.spare_is_known = self.changes < 0, True
         for k in np.flatnonzero(is_spare != self._is_spare).tolist():
-            if is_spare[k]:
-                self._geometry_data.deactivateCollisionPair(k)
-            else:
-                self._geometry_data.activateCollisionPair(k)
+            self._queries.activate(k, not is_spare[k])
         self._is_spare, self._there = is_spare, np.flatnonzero(~is_spare)
 
 
@@ -326,43 +347,3 @@ def _distance(body: pin.GeometryObject, shape: coal.CollisionGeometry, pose: pin
     # At coal's own tolerance of 1e-6 m: at tighter ones it may find no distance.
     request, result = coal.DistanceRequest(), coal.DistanceResult()
     return float(coal.distance(body.geometry, one, shape, other, request, result))
-
-
-def _geometry_model(arm: Arm, scene: Scene) -> tuple[pin.GeometryModel, list[int]]:
-    """Return all shapes and pairs, and how many shapes each obstacle has.
-
-    A cloud has a ball for each shape of the arm that moves, and is paired with it by that alone.
-    """
-    for attachment in scene.attachments:
-        if attachment not in arm.description.attachments:
-            name, allowed = attachment.body.name, "held by the arm: arm.holding(*scene.attachments)"
-            raise InvalidValueError("attached body", name, allowed)
-    model = arm.collision_model.copy()
-    moving = [
-        k
-        for k, item in enumerate(model.geometryObjects)
-        if item.parentJoint > 0 and item.name not in arm.self_pieces
-    ]
-    names, held = [item.name for item in model.geometryObjects], arm.description.attachments
-    touching = {
-        (name, obstacle)
-        for each in held
-        for name in numbered(each.body.name, len(each.body.convex_shapes()))
-        for obstacle in each.touch_obstacles
-    }
-    counts, pairs = [], model.collisionPairs
-    for obstacle in scene:
-        before = model.ngeoms
-        facing = [k for k in moving if (names[k], obstacle.name) not in touching]
-        for item in geometry_objects(obstacle, origin=arm.origin):
-            if model.existGeometryName(item.name):
-                allowed = f"other than the names of the shapes of {arm.name!r}"
-                raise InvalidValueError("obstacle name", item.name, allowed)
-            alone = isinstance(obstacle, PointCloud) and len(facing) > 0
-            for links in [[k] for k in facing] if alone else [facing]:
-                index = model.addGeometryObject(item)
-                for k in links:
-                    # addCollisionPair would compare it with all others.
-                    pairs.append(pin.CollisionPair(int(k), int(index)))
-        counts.append(model.ngeoms - before)
-    return model, counts
