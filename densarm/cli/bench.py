@@ -144,15 +144,7 @@ _set_options = together(
 @number_option("--problems", 50, "Number of problems.")
 @number_option("--seed", 0, "Seed of scenes, starts, goals and the planner.", least=0)
 @_set_options
-def random(
-    arm: str,
-    scenes: str,
-    problems: int,
-    seed: int,
-    jobs: int,
-    scheduler: str | None,
-    **options: Any,
-) -> None:
+def random(arm: str, scenes: str, problems: int, seed: int, **options: Any) -> None:
     """Move an arm between random configurations among random obstacles.
 
     Spheres, boxes, a wall with a gap or a shelf, in proportion to the arm's reach. Starts and
@@ -171,9 +163,10 @@ def random(
         report("loading")
         from densarm.study.random_problems import random_problems
 
-        chosen = random_problems(arm, problems, seed, scenes, jobs, report, scheduler)
-        options |= {"jobs": jobs, "scheduler": scheduler, "seed": seed}
-        finish = _run_set(chosen, report, **options)
+        chosen = random_problems(
+            arm, problems, seed, scenes, options["jobs"], report, options["scheduler"]
+        )
+        finish = _run_set(chosen, report, seed=seed, **options)
     finish()
 
 
