@@ -10,6 +10,7 @@ from densarm.arms.arm import Arm
 from densarm.arms.line import Segment
 from densarm.arms.upright import Upright
 from densarm.planning.guide import WayPoints
+from densarm.planning.path_margins import LIMIT_INSET
 from densarm.values.arrays import Array
 from densarm.world.separating_planes import SeparatingPlanes, configuration_tube
 from densarm.world.swept_check import SweptCheck, SweptVerdict
@@ -143,6 +144,7 @@ def blended_path(
             path = _passing(path, passed / length[-1], corner[way_points.rows])
             missed = passed[_misses(world.arm, path, passed / length[-1], way_points)]
         halved = ~np.fromiter(_clear_pieces(proof, path, length[-1]), dtype=np.bool_)
+        halved |= _near_limits(world.arm, path, corner)
         if upright is not None:
             halved |= ~np.fromiter(_upright_pieces(world.arm, path, upright), dtype=np.bool_)
         for at in missed:
@@ -181,6 +183,17 @@ def _misses(arm: Arm, path: SmoothPath, s: Array, way_points: WayPoints) -> NDAr
     """Return of which way points a path is too far off at s (M,)."""
     off = np.abs(arm.difference(way_points.q, arm.configurations(path(s)))).max(axis=1)
     return np.asarray(off > way_points.within + _ROUNDING)
+
+
+def _near_limits(arm: Arm, path: SmoothPath, corner: Array) -> NDArray[np.bool_]:
+    """Return which pieces may come nearer to position limits than the polyline and a little.
+
+    A way along a limit, which a path that passes points may swing out to, cannot be stopped on.
+    """
+    low = np.minimum(arm.limits.lower + LIMIT_INSET, corner.min(axis=0)) - _ROUNDING
+    high = np.maximum(arm.limits.upper - LIMIT_INSET, corner.max(axis=0)) + _ROUNDING
+    outside = ((path.control < low) | (path.control > high)).any(axis=1)
+    return np.asarray(np.lib.stride_tricks.sliding_window_view(outside, _DEGREE + 1).any(axis=1))
 
 
 def _is_straight(world: World, path: SmoothPath, line: Segment | None) -> bool:

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 import densarm
@@ -41,7 +41,8 @@ def passed(motion: Motion, arm: densarm.Arm) -> list[tuple[int, float]]:
 
 @pytest.mark.slow
 @settings(max_examples=20)
-@given(st.lists(place, min_size=4, max_size=5), st.sampled_from([0.01, 0.05, 0.2]))
+@given(places=st.lists(place, min_size=4, max_size=5), blend=st.sampled_from([0.01, 0.05, 0.2]))
+@example(places=[(0.0, 1.0), (0.0, 1.1875), (1.0, 1.0)], blend=0.01)  # near a position limit
 def test_all_are_passed_in_their_order_and_nothing_is_touched(
     plane: World, places: list[tuple[float, float]], blend: float
 ) -> None:
