@@ -10,13 +10,8 @@ from densarm.arms.dynamics import by_columns
 from densarm.values.arrays import Array
 from densarm.values.kernels import compiled, compiled_part, entry_point
 from densarm.world.active_pairs import ActivePairs, least_distance, pair_motion
-from densarm.world.distance_view import (
-    add_pair_gradient,
-    obstacle_speed,
-    shape_positions,
-    shape_rotations,
-)
-from densarm.world.pair_queries import PairQueries
+from densarm.world.distance_view import add_pair_gradient, obstacle_speed
+from densarm.world.pair_queries import BodyBalls, PairQueries, ball_gap
 from densarm.world.world import World
 
 _LAG = 0.04  # [s] until a velocity that is asked for is reached
@@ -24,10 +19,8 @@ _SOONEST = 0.03  # [s] in which a miss is made good
 _REACH = 0.12  # [m] beyond which a miss is no row
 
 # Of pairs: whether awake, distances, of those asleep ways and numbers for bounds, whether they
-# move, Lipschitz constants, twists and changes.
-_Now = tuple[
-    NDArray[np.int64], Array, Array, Array, NDArray[np.bool_], Array, Array, NDArray[np.int64]
-]
+# move, Lipschitz constants and twists.
+_Now = tuple[NDArray[np.int64], Array, Array, Array, NDArray[np.bool_], Array, Array]
 
 
 class MissesAhead:
@@ -57,29 +50,24 @@ class MissesAhead:
         margin: float,
         miss: float,
     ) -> None:
-        arm, geometry = world.arm, world.geometry_model
+        arm = world.arm
         self._world, self._limits = world, limits
         self._margins, self._reach = np.array([margin, miss]), miss + _REACH
         self._queries = PairQueries(arm.model, world, remembers=False)
-        data = self._queries.data
-        self._places, self._turns, self._came = shape_positions(data), shape_rotations(data), -1
         self._data = arm.model.createData()
         self._jacobian = by_columns(self._data.J, (6, arm.nv))
-        # Shapes of obstacles, and a pair of each; balls about all shapes, [middle, radius] in their
-        # frames; middles at a time ahead.
+        # Shapes of obstacles, and a pair of each.
         self._bodies = np.array(np.unique(world.pair_shapes[:, 1], return_index=True)).T
-        self._ball, self._middle = np.zeros((geometry.ngeoms, 4)), np.zeros((geometry.ngeoms, 3))
         self._there = np.zeros(arm.nv)
         self._near = np.zeros(world.n_pairs, np.int64)
-        moves = world.lipschitz, world.twist, world.changes
-        self._now = pairs.state, pairs.rows, pairs.way, pairs.slept, is_moving, *moves
+        slept = pairs.way, pairs.slept
+        self._now = pairs.state, pairs.rows, *slept, is_moving, world.lipschitz, world.twist
         # Kernels are loaded, or compiled, before a control loop.
         near, there = self._near, self._there
         self._may_meet = entry_point(
             _may_meet, self._now, there, there, limits, 0.0, 0.0, near, there
         )
-        shapes = self._places, self._turns, self._ball, self._middle
-        self._balls = is_moving, self._bodies, world.pair_shapes, *shapes, world.twist
+        self._balls = is_moving, self._bodies, self._queries.body_balls, world.twist
         self._meet = entry_point(_meet, near, *self._balls, 0.0, 0.0)
         self._slopes = is_moving, self._queries.rows, self._jacobian, world.sign
         rows = *self._slopes, there, self._margins, 0.0, np.zeros((1, arm.nv + 1))
@@ -95,14 +83,9 @@ class MissesAhead:
             table: rows (at least K, nv + 1).
         """
         world, near, there, reach = self._world, self._near, self._there, self._reach
-        n, turns, came = self._may_meet(
-            self._now, angles, v, self._limits, ahead, reach, near, there
-        )
+        n, turns = self._may_meet(self._now, angles, v, self._limits, ahead, reach, near, there)
         if not n:
             return 0
-        if came != self._came:
-            self._came = came
-            self._measure()
         model, data = world.arm.model, self._queries.data
         pin.computeJointJacobians(model, self._data, world.arm.configurations(there))
         pin.updateGeometryPlacements(model, self._data, world.geometry_model, data)
@@ -113,15 +96,6 @@ class MissesAhead:
         self._queries.ask(near[:n])
         soon = max(ahead - _LAG, _SOONEST)
         return int(self._miss_rows(near[:n], *self._slopes, v, self._margins, soon, table))
-
-    def _measure(self) -> None:
-        """Measure the balls, after an obstacle has come."""
-        for k, item in enumerate(self._world.geometry_model.geometryObjects):
-            shape = item.geometry
-            shape.computeLocalAABB()
-            self._ball[k] = *shape.aabb_center, shape.aabb_radius
-        for slot in self._world.clouds:
-            self._ball[self._world.pair_shapes[slot.pairs, 1], 3] = slot.obstacle.reach
 
 
 @compiled
@@ -134,17 +108,14 @@ def _may_meet(
     reach: float,
     near: NDArray[np.int64],
     there: Array,
-) -> tuple[int, bool, int]:
+) -> tuple[int, bool]:
     """Write which pairs may be within reach after some time, and where the joints are then.
 
-    Returns:
-        How many, whether the obstacle of any of them turns, and the last change of the world that
-        an obstacle came with.
+    How many is returned, and whether the obstacle of any of them turns.
     """
-    state, rows, way, slept, is_moving, lipschitz, twist, changes = now
-    count, turns, some, came, fastest = 0, False, False, 0, np.abs(v)
+    state, rows, way, slept, is_moving, lipschitz, twist = now
+    count, turns, some, fastest = 0, False, False, np.abs(v)
     for k in range(state.shape[0]):
-        came = max(came, changes[k])
         if state[k] == 0 and not is_moving[k]:
             continue
         speed, least = obstacle_speed(twist[k]), rows[k, 0]
@@ -157,7 +128,7 @@ def _may_meet(
             turns |= speed == math.inf
     for j in range(v.size):
         there[j] = min(max(angles[j] + ahead * v[j], limits[0, j]), limits[1, j])
-    return count if some else 0, turns, came
+    return count if some else 0, turns
 
 
 @compiled
@@ -165,16 +136,13 @@ def _meet(
     near: NDArray[np.int64],
     is_moving: NDArray[np.bool_],
     bodies: NDArray[np.int64],
-    pair_shapes: NDArray[np.int64],
-    places: Array,
-    turns: Array,
-    balls: Array,
-    middles: Array,
+    balls: BodyBalls,
     twist: Array,
     ahead: float,
     reach: float,
 ) -> int:
     """Move obstacles on, and keep pairs whose balls are within reach; return how many are left."""
+    places = balls.positions
     for b in range(bodies.shape[0]):
         shape, k = bodies[b]
         x, y, z = places[shape]
@@ -182,19 +150,9 @@ def _meet(
         places[shape, 0] += ahead * (twist[k, 0] + (wy * z - wz * y))
         places[shape, 1] += ahead * (twist[k, 1] + (wz * x - wx * z))
         places[shape, 2] += ahead * (twist[k, 2] + (wx * y - wy * x))
-    for shape in range(balls.shape[0]):
-        for i in range(3):
-            middles[shape, i] = places[shape, i]
-            for j in range(3):
-                middles[shape, i] += turns[shape, i, j] * balls[shape, j]
     count, some = 0, False
     for k in near:
-        first, second = pair_shapes[k]
-        apart = reach + balls[first, 3] + balls[second, 3]
-        square = 0.0
-        for i in range(3):
-            square += (middles[first, i] - middles[second, i]) ** 2
-        if not square > apart * apart:  # a half-space has no middle
+        if ball_gap(balls, k) <= reach:
             near[count] = k
             count += 1
             some |= is_moving[k]

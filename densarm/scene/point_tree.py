@@ -50,6 +50,15 @@ def put_nearer_last(
 
 
 @compiled_lean_part
+def square_from_box(box: Array, x: Array) -> float:
+    """Return the square of the distance of a place (3,) from a box (6,) [m²]."""
+    square = 0.0
+    for axis in range(3):
+        square += max(box[axis] - x[axis], x[axis] - box[3 + axis], 0.0) ** 2
+    return square
+
+
+@compiled_lean_part
 def leaf_points(tree: PointTree, node: int) -> tuple[int, int]:
     """Return the first point of a node and that after the last; none of a node that is no leaf."""
     n, n_leaves = tree.points.shape[0], (tree.boxes.shape[0] + 1) // 2

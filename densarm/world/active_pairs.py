@@ -144,7 +144,7 @@ class ActivePairs:
             world.changes,
             world.obstacle_way,
             self._blocks,
-            self._queries.body_balls,
+            self._queries.body_balls if self._queries.is_large else None,
         )
         self._wake = entry_point(_wake, any_vector, *self._arrays)
         self.update(rest)  # kernels are loaded, or compiled, before a control loop

@@ -7,7 +7,13 @@ from weakref import WeakKeyDictionary
 import numpy as np
 from numpy.typing import NDArray
 
-from densarm.scene.point_tree import DEEPEST, PointTree, leaf_points, put_nearer_last
+from densarm.scene.point_tree import (
+    DEEPEST,
+    PointTree,
+    leaf_points,
+    put_nearer_last,
+    square_from_box,
+)
 from densarm.values.arrays import Array
 from densarm.values.kernels import compiled_lean_part, compiled_part
 from densarm.world.bodies import Bodies, bodies_of
@@ -180,7 +186,7 @@ def _from_points(bodies: Bodies, c: int, most: float, x: Array, space: CloudSpac
         begin, end = leaf_points(PointTree(points, boxes), node)
         if begin == end:
             one, other = 2 * node + 2, 2 * node + 1
-            near, far = _square(boxes[one], x), _square(boxes[other], x)
+            near, far = square_from_box(boxes[one], x), square_from_box(boxes[other], x)
             count = put_nearer_last(one, near, other, far, waiting, bounds, count)
         for k in range(begin, end):
             square = 0.0
@@ -188,12 +194,3 @@ def _from_points(bodies: Bodies, c: int, most: float, x: Array, space: CloudSpac
                 square += (points[k, axis] - x[axis]) ** 2
             least = min(least, square)
     return math.sqrt(least)
-
-
-@compiled_lean_part
-def _square(box: Array, x: Array) -> float:
-    """Return the square of the distance of a place from a box (6,)."""
-    square = 0.0
-    for axis in range(3):
-        square += max(box[axis] - x[axis], x[axis] - box[3 + axis], 0.0) ** 2
-    return square

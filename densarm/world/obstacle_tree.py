@@ -6,7 +6,13 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from densarm.scene.point_tree import DEEPEST, PointTree, leaf_points, point_tree
+from densarm.scene.point_tree import (
+    DEEPEST,
+    PointTree,
+    leaf_points,
+    point_tree,
+    square_from_box,
+)
 from densarm.values.arrays import Array
 from densarm.values.kernels import compiled_part
 from densarm.world.bodies import BALL, LIPSCHITZ, Bodies, bodies_of
@@ -121,7 +127,7 @@ def found_pairs(
         while n_waiting > 0:
             n_waiting -= 1
             node = waiting[n_waiting]
-            if _from_box(boxes[node], middle) > needed + tree.reach[node]:
+            if math.sqrt(square_from_box(boxes[node], middle)) > needed + tree.reach[node]:
                 continue
             begin, end = leaf_points(tree.middles, node)
             if begin == end:
@@ -145,15 +151,6 @@ def write_least(tree: ObstacleTree, pairs: Integers, radius: Array) -> None:
         tree.least[k] = tree.kept[k]
         for j in range(radius.size):
             tree.least[k] += tree.lipschitz[k, j] * radius[j]
-
-
-@compiled_part
-def _from_box(box: Array, x: Array) -> float:
-    square = 0.0
-    for a in range(3):
-        off = max(box[a] - x[a], x[a] - box[3 + a], 0.0)
-        square += off * off
-    return math.sqrt(square)
 
 
 @compiled_part

@@ -73,7 +73,8 @@ class PairQueries:
         self.data: pin.GeometryData = self._slots.data if self._slots else geometry.createData()
         """Pinocchio's data; a query is of the placements that it has."""
         frames = shape_positions(self.data), shape_rotations(self.data)
-        self._body_balls = BodyBalls(pair_shapes, obstacles.balls, *frames)
+        self.body_balls = BodyBalls(pair_shapes, obstacles.balls, *frames)
+        """Balls around all bodies, where the data has them."""
         self._requests = list(self.data.distanceRequests)
         for request in self._requests:
             request.gjk_tolerance = request.epa_tolerance = COAL_TOLERANCE
@@ -93,13 +94,13 @@ class PairQueries:
         self.ask(np.zeros(0, np.int64))  # its kernel is loaded before a control loop
 
     @property
-    def body_balls(self) -> BodyBalls | None:
-        """What tells which pairs are far, where to ask for all would take half a second."""
-        return self._body_balls if self._slots else None
+    def is_large(self) -> bool:
+        """Whether to ask for all pairs would take half a second: balls tell which are far."""
+        return self._slots is not None
 
     def bounds(self, pairs: NDArray[np.int64]) -> Array:
         """Return lower bounds of the distances of some pairs (P,), by balls around bodies [m]."""
-        return np.asarray(_bounds(self._body_balls, pairs))
+        return np.asarray(_bounds(self.body_balls, pairs))
 
     def place(self, data: pin.Data) -> None:
         """Put all shapes where the data has the joints; obstacles only once they have changed."""

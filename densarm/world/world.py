@@ -167,7 +167,7 @@ class World(ChangingObstacles):
 
         Those beyond a limit [m] may be lower bounds then, above the limit too.
         """
-        if self._queries.body_balls is None:
+        if not self._queries.is_large:
             return self.distances(q, pairs)
         asked = np.arange(self.n_pairs) if pairs is None else pairs
         found = self.bounds(q, asked)
@@ -265,7 +265,7 @@ class World(ChangingObstacles):
 
     def _keeps(self, q: Array, margin: float) -> bool:
         """Return whether all pairs are farther apart than a margin [m] at q (nq,)."""
-        whole = self.spare_is_known and not self.clouds and self._queries.body_balls is None
+        whole = self.spare_is_known and not self.clouds and not self._queries.is_large
         if margin > 0.0 or not whole:
             return bool(self.distances_within(q, margin).min(initial=np.inf) > margin)
         # Takes a quarter of the time that distances take.
