@@ -14,7 +14,7 @@ from densarm.scene.point_tree import (
     square_from_box,
 )
 from densarm.values.arrays import Array
-from densarm.values.kernels import compiled_part
+from densarm.values.kernels import compiled_lean_part
 from densarm.world.bodies import BALL, LIPSCHITZ, Bodies, bodies_of
 from densarm.world.pair_slots import N_SLOTS
 from densarm.world.simplex import Integers
@@ -47,6 +47,10 @@ class ObstacleTree(NamedTuple):
     """`World.lipschitz`."""
     least: Array
     """Room for what each pair must exceed in all (K,) [m]."""
+    waiting: Integers
+    """Room for nodes that wait in a search (DEEPEST,)."""
+    middle: Array
+    """Room for the middle of a ball (3,) [m]."""
 
 
 def obstacle_tree(world: World, kept: Array) -> ObstacleTree:
@@ -87,7 +91,8 @@ def _tree(bodies: Bodies, order: Integers, lipschitz: Array) -> ObstacleTree:
     links = np.unique(bodies.pairs[there, 0])
     radius = bodies.shapes[body[at], BALL]
     own, none = (_reach(tree, radius), rows[at], links, found, len(always)), np.zeros(0)
-    return ObstacleTree(tree, *own, none, 0.0, lipschitz, none)
+    room = np.zeros(DEEPEST, np.int64), np.zeros(3)
+    return ObstacleTree(tree, *own, none, 0.0, lipschitz, none, *room)
 
 
 def _reach(tree: PointTree, radius: Array) -> Array:
@@ -104,11 +109,13 @@ def _reach(tree: PointTree, radius: Array) -> Array:
     return reach
 
 
-@compiled_part
-def found_pairs(
+@compiled_lean_part
+def write_found(
     tree: ObstacleTree, bodies: Bodies, pose: Array, motion: Array, radius: Array
-) -> Integers:
-    """Return which pairs are not apart by their balls, and those that are always looked at.
+) -> int:
+    """Write which pairs are not apart by their balls, after those that are always looked at.
+
+    How many there are in all is returned.
 
     Args:
         tree: the obstacles.
@@ -118,9 +125,11 @@ def found_pairs(
         radius: by which joints may be off it (nv,) [rad or m].
     """
     shapes, points, boxes = bodies.shapes, tree.middles.points, tree.middles.boxes
-    waiting, count = np.empty(DEEPEST, np.int64), tree.n_always
+    waiting, middle, count = tree.waiting, tree.middle, tree.n_always
     for i in tree.links:
-        needed, middle = tree.most + shapes[i, BALL] + 0.5 * motion[i, 0] + _ROUNDING, pose[i, 9:]
+        needed = tree.most + shapes[i, BALL] + 0.5 * motion[i, 0] + _ROUNDING
+        for axis in range(3):
+            middle[axis] = pose[i, 9 + axis]
         for j in range(radius.size):
             needed += shapes[i, LIPSCHITZ + j] * radius[j]
         n_waiting, waiting[0] = 1, 0
@@ -134,17 +143,22 @@ def found_pairs(
                 waiting[n_waiting], waiting[n_waiting + 1] = 2 * node + 1, 2 * node + 2
                 n_waiting += 2
             for n in range(begin, end):
-                body, k, last = tree.bodies[n]
-                if _apart(points[n], middle) <= needed + shapes[body, BALL]:
-                    while k < last:
-                        if bodies.pairs[k, 0] == i:
-                            tree.found[count] = k
-                            count += 1
-                        k += 1
-    return tree.found[:count]
+                if _apart(points[n], middle) <= needed + shapes[tree.bodies[n, 0], BALL]:
+                    count = _add_pairs(tree, bodies, n, i, count)
+    return count
 
 
-@compiled_part
+@compiled_lean_part
+def _add_pairs(tree: ObstacleTree, bodies: Bodies, ball: int, link: int, count: int) -> int:
+    """Add the pairs of a ball and a link to those that were found; return how many there are."""
+    for k in range(tree.bodies[ball, 1], tree.bodies[ball, 2]):
+        if bodies.pairs[k, 0] == link:
+            tree.found[count] = k
+            count += 1
+    return count
+
+
+@compiled_lean_part
 def write_least(tree: ObstacleTree, pairs: Integers, radius: Array) -> None:
     """Write what pairs must exceed, with joints off their way by a radius (nv,) [rad or m]."""
     for k in pairs:
@@ -153,7 +167,7 @@ def write_least(tree: ObstacleTree, pairs: Integers, radius: Array) -> None:
             tree.least[k] += tree.lipschitz[k, j] * radius[j]
 
 
-@compiled_part
+@compiled_lean_part
 def _apart(x: Array, y: Array) -> float:
     square = 0.0
     for a in range(3):

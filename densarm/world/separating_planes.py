@@ -6,7 +6,7 @@ import numpy as np
 
 from densarm.values.arrays import Array
 from densarm.values.checks import non_negative
-from densarm.values.kernels import compiled, compiled_part, entry_point
+from densarm.values.kernels import compiled, compiled_lean_part, entry_point
 from densarm.world.arc_separation import (
     NOTHING,
     ArcSpace,
@@ -18,8 +18,7 @@ from densarm.world.arc_separation import (
 from densarm.world.bodies import Bodies, bodies_of, place, write_motion_bounds
 from densarm.world.cloud_field import fields_of
 from densarm.world.cloud_separation import PLANES
-from densarm.world.obstacle_tree import ObstacleTree, found_pairs, obstacle_tree, write_least
-from densarm.world.simplex import Integers
+from densarm.world.obstacle_tree import ObstacleTree, obstacle_tree, write_found, write_least
 from densarm.world.world import DISTANCE_TOLERANCE, World
 
 _FLOOR = 1e-4  # [rad or m], length of a segment at which one not proved clear counts as not clear
@@ -181,7 +180,8 @@ def _polyline_is_clear(
             continue
         order = first if stage == 1 else memory.order[_FIRST:]
         if is_large and stage == 2:
-            order = _found(bodies, memory.tree, radius, angles, space)
+            order = memory.tree.found[: _find(bodies, memory.tree, radius, angles, space)]
+            write_least(memory.tree, order, radius)
         # Pairs, arcs on which they are not proved, and what is known of them there.
         waiting = np.empty((order.size, 3), np.int64)
         for n in range(order.size):
@@ -197,16 +197,12 @@ def _polyline_is_clear(
     return True
 
 
-@compiled_part
-def _found(
-    bodies: Bodies, tree: ObstacleTree, radius: Array, angles: Array, space: ArcSpace
-) -> Integers:
-    """Return which of very many pairs may touch on a segment, and write what they must exceed."""
+@compiled_lean_part
+def _find(bodies: Bodies, tree: ObstacleTree, radius: Array, angles: Array, space: ArcSpace) -> int:
+    """Write which of very many pairs may touch on a segment, and return how many do."""
     joint_pose, pose, is_asked = space.joint_poses[1], space.poses[1], space.is_asked
     for body in range(is_asked.size):
         is_asked[body] = bodies.joint[body] > 0
     place(bodies, angles, space.step, 0.5, is_asked, joint_pose, pose)
     write_motion_bounds(bodies, space.step, 1.0, is_asked, joint_pose, pose, space.bounds)
-    pairs = found_pairs(tree, bodies, pose, space.bounds[0], radius)
-    write_least(tree, pairs, radius)
-    return pairs
+    return write_found(tree, bodies, pose, space.bounds[0], radius)
