@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,6 +36,7 @@ _TIMES = 8  # at which misses are looked for, one every other call in turn
 _FASTEST = 1e3  # [rad/s or m/s], where joints have no limit
 _RECOVERY = 4.0  # [1/s] of a margin that is lost, and at which the way to a joint limit shrinks
 _STANDING_RATE = 10.0  # [1/s] at which the distance to what stands may shrink
+_STANDING_GAP = 1e-3  # [m] that soft rows may give up before what stands is touched
 _BRAKE_SHARE = 0.5  # of the accelerations, that a stop before what stands reckons with
 _REACH_SHARE = 1.1  # of what accelerations reach, since reach is of the next step
 _WEIGHT = 1e4  # of a row's lack
@@ -85,7 +87,8 @@ class Evasion:
         \min_{\dot q} \|\dot q - \dot q_{nom}\|^2 \quad \text{with} \quad
         \nabla h_k \cdot \dot q + n_k \cdot w_k \ge -\frac{\gamma}{\partial \ln\Psi_k / \partial h}
         \quad \text{(what moves)}, \\
-        \nabla h_k \cdot \dot q \ge -\sqrt{2 a_k h_k} \quad \text{(what stands)}, \qquad
+        \nabla h_k \cdot \dot q \ge -\sqrt{2 a_k (h_k - \epsilon)} \quad
+        \text{(what stands)}, \qquad
         \hat h_k + (\tau - \tau_0) \nabla \hat h_k \cdot (\dot q - v) \ge 0 \quad
         \text{(misses ahead)}
 
@@ -97,7 +100,8 @@ class Evasion:
     accelerations make along ∇h_k, so that the arm stops in time where it flees. Bounds on q̇ are
     those of velocities, of what accelerations reach within 1/K_v, and of the way to joint limits.
     Rows are soft, since not all can hold at times, each measured along its gradient [rad/s or m/s],
-    those of what stands 30 times: into a wall no ball may drive the arm. Bounds hold always. Rows
+    those of what stands 30 times: into a wall no ball may drive the arm. What they give up then
+    comes out of ε = 1 mm, and where that is lost they ask for it back. Bounds hold always. Rows
     that hold for all velocities in reach are left out, and where q̇_nom keeps all there is no
     problem to solve.
 
@@ -216,6 +220,7 @@ def _note_moving(
     return some
 
 
+@cache
 def _farthest(width: float, decay: float) -> Array:
     """Return up to which h [m] a row of what moves asks for more than each of `_CLOSING`."""
     h = np.linspace(_LEAST_SHARE, 1.0, 2000, endpoint=False) * width
@@ -338,8 +343,9 @@ def _density_rows(
             speed = write_slope(rows[k], jacobian, sign[k], v, row)
             for j in range(n):
                 brake += abs(row[j]) * limits[3, j]
-            left = max(h - reaction * max(-speed, 0.0), 0.0)
-            row[n] = -min(_STANDING_RATE * left, math.sqrt(2.0 * _BRAKE_SHARE * brake * left))
+            left = h - _STANDING_GAP - reaction * max(-speed, 0.0)
+            most = math.sqrt(2.0 * _BRAKE_SHARE * brake * max(left, 0.0))
+            row[n] = -_STANDING_RATE * left if left < 0.0 else -min(_STANDING_RATE * left, most)
             standing += 1
         else:
             rate = pair_rate(rows[k], twist[k])

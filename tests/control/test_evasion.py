@@ -141,6 +141,36 @@ def test_a_pair_that_sleeps_would_ask_for_nothing(
     np.testing.assert_allclose(found[0], found[1], atol=1e-9)
 
 
+@settings(max_examples=20, deadline=None)
+@given(
+    way=st.tuples(*[st.floats(-1.0, 1.0)] * 3).filter(lambda way: np.linalg.norm(way) > 0.1),
+    gap=st.floats(1e-4, 3e-3),
+)
+def test_an_arm_that_evades_keeps_a_millimetre_off_what_stands(
+    panda: Arm, way: Array, gap: float
+) -> None:
+    """It is to be driven into a ball that stands by the hand, and backs off where it is nearer."""
+    q, v = panda.postures["ready"], np.zeros(panda.nv)
+    at = np.array([0.31, 0.0, 0.52]) + 0.25 * np.array(way) / np.linalg.norm(way)
+    point = World(panda, Scene([Sphere(name="point", radius=0.01, position=at)]))
+    far = [d for d, pair in zip(point.distances(q), point.pairs, strict=True) if "point" in pair]
+    assume((size := 0.01 + min(far) - gap) > 0.0)
+    stands = Sphere(name="stands", radius=size, position=at)
+    world = World(panda, Scene([stands, Sphere(name="comes", radius=0.08, position=(0, 0, 9.0))]))
+    evasion = Evasion(world, pairs := ActivePairs(world), 0.0)
+    world.move_obstacle("comes", (0.0, 0.0, 5.0), velocity=(0.0, 0.0, -1.0))
+    assert evasion.is_needed()
+    sample = world.clearance(q)
+    nearest = int(sample.distance.argmin())
+    slope = sample.gradient[nearest]
+    assert sample.distance[nearest] == pytest.approx(gap, abs=1e-6)
+    for _ in range(2):  # since the first call tells how far pairs are to be awake
+        pairs.update(q)
+        found, _ = evasion.velocity(q, v, -0.05 * slope / np.linalg.norm(slope))
+    fastest = float(np.abs(slope) @ (0.9 * panda.limits.acceleration / EVADING_GAIN))
+    assert slope @ found >= min(10.0 * (1e-3 - gap), fastest) - 1e-6
+
+
 @pytest.fixture(scope="module")
 def crossing_runs() -> dict[type[Evasion], Run]:
     """A ball of 1 m/s that would hit the moving Panda, with and without what evades it."""
