@@ -108,8 +108,8 @@ class Disturbances:
     @property
     def given(self) -> dict[str, Any]:
         """What is not by default, as JSON data; empty for an arm that is its model."""
-        default = Disturbances()
-        told = {key: x for key, x in asdict(self).items() if x != asdict(default)[key]}
+        default = asdict(Disturbances())
+        told = {key: x for key, x in asdict(self).items() if x != default[key]}
         # Lists where there are tuples, as a record that was read again has them.
         return dict(json.loads(json.dumps(told))) if set(told) - {"seed"} else {}
 

@@ -69,38 +69,47 @@ def entry_point(kernel: Callable[..., Any], *arguments: object) -> Callable[...,
     """
     if not isinstance(kernel, Dispatcher):  # compiling is switched off
         return kernel
-    known: Any = kernel
-    signature = tuple(_type_of(argument) for argument in arguments)
-    known.compile(signature)
-    entry: Callable[..., Any] = known.overloads[signature].entry_point
-    return entry
+    return _entry_point(kernel, tuple(map(_kind_of, arguments)))
 
 
-def _type_of(argument: object) -> Any:
-    """Return numba's type of an argument, of matrices by their strides.
+_Kind = tuple[Any, ...]  # what determines the type of an argument, found and compared in no time
+
+
+def _kind_of(argument: object) -> _Kind:
+    """Return what determines numba's type of an argument, of matrices by their strides.
 
     A view of but one row or column lies in memory as a C array does. Numba would take it for one,
     and compile a kernel anew for an arm of one joint, or a world of one pair.
     """
-    known: Any = numba
     if isinstance(argument, tuple):
-        parts = [_type_of(part) for part in argument]
-        return known.types.BaseTuple.from_types(parts, type(argument))
+        return type(argument), *map(_kind_of, argument)
     if not isinstance(argument, np.ndarray):
-        return known.typeof(argument)
+        return (type(argument),)
     flags, size = argument.flags, argument.itemsize
     is_c, is_f = flags.c_contiguous, flags.f_contiguous
     if argument.ndim == 2:
         is_c = argument.strides in ((size * argument.shape[1], size), (0, 0))  # or new, and empty
         is_f = is_f and argument.strides[0] == size
     layout = "C" if is_c else "F" if is_f else "A"
-    return _array_type(argument.dtype, argument.ndim, layout, flags.writeable)
+    return np.ndarray, argument.dtype, argument.ndim, layout, flags.writeable
 
 
 @cache
-def _array_type(dtype: np.dtype[Any], ndim: int, layout: str, is_writeable: bool) -> Any:
-    """Return numba's type of an array, which takes numba longer to find out each time."""
+def _entry_point(kernel: Any, kinds: tuple[_Kind, ...]) -> Callable[..., Any]:
+    signature = tuple(map(_type_of, kinds))
+    kernel.compile(signature)
+    entry: Callable[..., Any] = kernel.overloads[signature].entry_point
+    return entry
+
+
+def _type_of(kind: _Kind) -> Any:
     known: Any = numba
+    of, *parts = kind
+    if issubclass(of, tuple):
+        return known.types.BaseTuple.from_types(list(map(_type_of, parts)), of)
+    if of is not np.ndarray:
+        return known.typeof(of())
+    dtype, ndim, layout, is_writeable = parts
     found = known.typeof(np.empty((0,) * ndim, dtype))
     return found.copy(layout=layout, readonly=not is_writeable)
 

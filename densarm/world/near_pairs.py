@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from densarm.values.arrays import Array
-from densarm.values.kernels import compiled
+from densarm.values.kernels import any_vector, compiled, entry_point
 from densarm.world.active_pairs import go, joint_numbers, pair_motion
 from densarm.world.pair_blocks import (
     BLOCK,
@@ -51,7 +51,11 @@ class NearPairs:
             *(self._blocks, rest, index, world.lipschitz, joints, self._numbers, self._asked),
             *(world.changes, world.obstacle_way),
         )
-        self._question = 0
+        self._question, some = 0, self._asked[1, :0]
+        types = any_vector, self._limit, 0.0, 0, *self._arrays
+        self._may_be_below = entry_point(_may_be_below, *types)
+        known = world.query(rest, some), some, self._numbers, self._blocks
+        self._learn = entry_point(_learn, *known)
 
     def below(self, q: Array, limit: float | Array) -> tuple[Pairs, Array]:
         """Return pairs (P,) and their distances (P,) [m] at q (nq,).
@@ -83,15 +87,15 @@ class NearPairs:
         if self._version != world.version:
             self._version = world.version
             self._blocks[:, 0] = -np.inf
-        most = float(np.max(limit, initial=-np.inf))
-        count = _may_be_below(q, self._limit, most, self._question, *self._arrays)
+        most = limit if isinstance(limit, float) else float(np.max(limit, initial=-np.inf))
+        count = self._may_be_below(q, self._limit, most, self._question, *self._arrays)
         pairs = self._asked[1, :count]
         if count > N_SLOTS:  # of which is found out first which are far
             bounds = world.bounds(q, pairs)
             n_near = _learn_far(bounds, self._asked, self._limit, numbers, self._blocks)
             pairs = pairs[:n_near]
         rows = world.query(q, pairs)
-        return pairs, rows, _learn(rows, pairs, numbers, self._blocks)
+        return pairs, rows, self._learn(rows, pairs, numbers, self._blocks)
 
 
 def least_distances(world: World, q: Array, limit: float) -> Array:
