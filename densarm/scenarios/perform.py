@@ -40,9 +40,10 @@ from densarm.scene.obstacles import Obstacle, obstacle_pose, pose_fields
 from densarm.scene.scene import Attachment, Scene
 from densarm.simulation.disturbances import Disturbances
 from densarm.simulation.run import Run
-from densarm.simulation.simulate import OnProgress, simulate_task
+from densarm.simulation.simulate import simulate_task
 from densarm.values.arrays import Array
 from densarm.values.outcome import Outcome
+from densarm.values.progress import OnProgress
 from densarm.world.swept_check import SweptCheck
 from densarm.world.world import World
 

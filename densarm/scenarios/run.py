@@ -33,10 +33,11 @@ from densarm.scenarios.scenario import Scenario, load_scenario
 from densarm.simulation.disturbances import Disturbances
 from densarm.simulation.plants import Plant
 from densarm.simulation.run import Run
-from densarm.simulation.simulate import OnProgress, simulate_task
+from densarm.simulation.simulate import simulate_task
 from densarm.values.arrays import Array
 from densarm.values.checks import one_of
 from densarm.values.outcome import Outcome
+from densarm.values.progress import OnProgress, shown_progress
 from densarm.world.swept_check import SweptCheck
 from densarm.world.world import World
 
@@ -64,7 +65,7 @@ def run(
     scenario: Scenario | str | Path,
     guide: Guide | str | None = None,
     seed: int | None = None,
-    on_progress: OnProgress = lambda _: None,
+    on_progress: OnProgress | None = None,
     *,
     plant: Plant | str | None = None,
     disturbances: Disturbances | None = None,
@@ -75,7 +76,7 @@ def run(
         scenario: what to run: a `Scenario`, a known name, or the path of a TOML file.
         guide: one of `GUIDES`, or a `Guide`; None for the scenario's own.
         seed: of the guide's random choices; None for the scenario's own.
-        on_progress: told what is being done.
+        on_progress: told what is being done; None for a line below the cell of a notebook.
         plant: "pinocchio", "mujoco", or a plant of one's own; None for the scenario's.
         disturbances: how the plant differs from the arm's model; None for the scenario's own.
 
@@ -99,12 +100,14 @@ def run(
     if disturbances is not None:
         chosen = replace(chosen, disturbances=disturbances)
     own = None if guide is None or isinstance(guide, str) else guide
-    if chosen.steps:
-        if own is not None or not (plant is None or isinstance(plant, str)):
-            raise InvalidValueError("guide or plant", own or plant, "one by name, of steps")
-        return perform(chosen, on_progress)
+    is_by_name = own is None and (plant is None or isinstance(plant, str))
+    if chosen.steps and not is_by_name:
+        raise InvalidValueError("guide or plant", own or plant, "one by name, of steps")
     other = None if isinstance(plant, str) else plant
-    return run_by(chosen, lambda scenario: by_density(scenario, own), on_progress, other)
+    with shown_progress(on_progress) as tell:
+        if chosen.steps:
+            return perform(chosen, tell)
+        return run_by(chosen, lambda scenario: by_density(scenario, own), tell, other)
 
 
 def run_by(

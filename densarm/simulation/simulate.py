@@ -1,6 +1,5 @@
 """The fixed-step loop: any controller around any plant, judged and recorded."""
 
-from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -18,13 +17,11 @@ from densarm.simulation.run import Run
 from densarm.values.arrays import Array
 from densarm.values.checks import finite_vector, one_of
 from densarm.values.outcome import Outcome
+from densarm.values.progress import OnProgress
 from densarm.world.configurations import infeasibility
 from densarm.world.near_pairs import NearPairs
 from densarm.world.swept_check import SweptCheck
 from densarm.world.world import World
-
-OnProgress = Callable[[str], None]
-"""Told in a phrase what is being done."""
 
 _PROGRESS_INTERVAL = 200  # steps
 

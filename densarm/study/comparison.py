@@ -17,7 +17,6 @@ from densarm.planning.motion import TimingParameters
 from densarm.scenarios.control import ControlForm
 from densarm.scenarios.run import Drive, run_by
 from densarm.scenarios.scenario import Scenario
-from densarm.simulation.simulate import OnProgress
 from densarm.study.baselines import BASELINES, DENSITIES, MAIN_PARAMETERS
 from densarm.study.cluster import in_order
 from densarm.study.conditions import Condition
@@ -25,6 +24,7 @@ from densarm.study.measures import path_length
 from densarm.values.arrays import Array
 from densarm.values.checks import non_negative_integer, positive_integer
 from densarm.values.outcome import FAILED, RUN_ENDS, Outcome
+from densarm.values.progress import OnProgress
 from densarm.world.configurations import clear_configurations
 
 if TYPE_CHECKING:

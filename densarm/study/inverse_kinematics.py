@@ -16,6 +16,7 @@ from densarm.errors import DensarmError, UnknownNameError
 from densarm.scenarios.scenario import load_scenario
 from densarm.values.arrays import Array
 from densarm.values.checks import non_negative_integer, positive_integer
+from densarm.values.progress import OnProgress
 from densarm.world.configurations import clear_configurations
 
 _POSITION, _TURN = 1e-4, 1e-3  # [m] and [rad] that a pose may be off
@@ -46,7 +47,7 @@ def time_poses(
     names: tuple[str, ...] = (),
     poses: int = 200,
     seed: int = 0,
-    on_progress: Callable[[str], None] = lambda _: None,
+    on_progress: OnProgress = lambda _: None,
 ) -> list[PoseResults]:
     """Look for poses that configurations evenly within the limits have, and time each search.
 

@@ -3,8 +3,8 @@
 import json
 import time
 import zlib
-from collections.abc import Callable, Mapping
-from contextlib import closing
+from collections.abc import Mapping
+from contextlib import ExitStack, closing
 from dataclasses import dataclass, field, fields, replace
 from difflib import get_close_matches
 from functools import cache, partial
@@ -26,6 +26,7 @@ from densarm.study.problems import ProblemResult, problem_result
 from densarm.values.checks import finite_number, non_negative_integer, positive_integer
 from densarm.values.files import atomic_file
 from densarm.values.outcome import FAILED, RUN_ENDS, Outcome
+from densarm.values.progress import OnProgress, shown_progress
 from densarm.values.proportion import Proportion
 from densarm.world.configurations import clear_configurations, drawn_between
 
@@ -159,7 +160,7 @@ def run_study(
     jobs: int = 1,
     scheduler: str | None = None,
     save: Path | None = None,
-    on_progress: Callable[[str], None] = lambda _: None,
+    on_progress: OnProgress | None = None,
 ) -> Rows:
     """Run a study, or what is not in its file yet.
 
@@ -170,7 +171,7 @@ def run_study(
         scheduler: address of a Dask scheduler whose workers run it, in place of processes here.
         save: the file, written as results come, so that an interrupted study goes on where it was;
             None to keep nothing.
-        on_progress: told what is being done.
+        on_progress: told what is being done; None for a line below the cell of a notebook.
 
     Returns:
         A record of each run (starts,), the same bit for bit whoever ran it. A run that raises an
@@ -191,23 +192,25 @@ def run_study(
     chunks = [missing[k : k + size] for k in range(0, len(missing), size)]
     workers, began, saved, spent = [""], time.perf_counter(), time.perf_counter(), 0.0
 
-    def tell(count: int) -> None:
+    def note(count: int) -> None:
         left = (time.perf_counter() - began) / count * (len(missing) - count) if count else 0.0
         more = f", some {left:.0f} s more" if count else ""
-        on_progress(f"{starts - len(missing) + count} of {starts} runs{more}{workers[0]}")
+        tell(f"{starts - len(missing) + count} of {starts} runs{more}{workers[0]}")
 
     def who(phrase: str) -> None:
         workers[0] = f"; {phrase}"
-        tell(0)
+        note(0)
 
     count = 0
-    tell(count)
     try:
-        with closing(as_completed(partial(_run, study), chunks, jobs, scheduler, who)) as results:
-            for indices, found in results:
+        with ExitStack() as stack:
+            tell = stack.enter_context(shown_progress(on_progress))
+            note(count)
+            work = as_completed(partial(_run, study), chunks, jobs, scheduler, who)
+            for indices, found in stack.enter_context(closing(work)):
                 rows[indices] = found
                 count += len(indices)
-                tell(count)
+                note(count)
                 if save is not None and time.perf_counter() - saved >= spent / _SAVING:
                     begin = time.perf_counter()
                     _save(save, study, rows)
@@ -225,7 +228,7 @@ def _run(study: Study, indices: NDArray[np.intp]) -> tuple[NDArray[np.intp], Row
         try:
             case = study.case(index)
             row["start"] = case.arm.angles(case.start)
-            found = problem_result(case.name, index, partial(run, case))
+            found = problem_result(case.name, index, partial(run, case, on_progress=_quiet))
         except DensarmError as error:
             found = ProblemResult(study.scenario.name, index, FAILED, str(error))
         row["varied"] = list(study.values(index).values())
@@ -235,6 +238,10 @@ def _run(study: Study, indices: NDArray[np.intp]) -> tuple[NDArray[np.intp], Row
             value = getattr(found, name)
             row[name] = np.nan if value is None else value
     return indices, rows
+
+
+def _quiet(_: str) -> None:
+    """Tell nobody of a single run."""
 
 
 def _save(path: Path, study: Study, rows: Rows) -> None:

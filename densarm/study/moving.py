@@ -35,6 +35,7 @@ from densarm.study.problems import named_arm
 from densarm.study.random_problems import Workspace
 from densarm.values.arrays import Array
 from densarm.values.checks import non_negative_integer, one_of, positive, positive_integer
+from densarm.values.progress import OnProgress
 from densarm.world.near_pairs import NearPairs
 from densarm.world.world import World
 
@@ -170,7 +171,7 @@ def run_trials(
     methods: Sequence[str],
     jobs: int = 1,
     save_dir: Path | None = None,
-    on_progress: Callable[[str], None] = lambda _: None,
+    on_progress: OnProgress = lambda _: None,
     scheduler: str | None = None,
 ) -> dict[str, Outcomes]:
     """Run the same trials by each of some methods, at 1 kHz.

@@ -24,6 +24,7 @@ from densarm.study.cluster import in_order
 from densarm.study.measures import motion_time, path_length, shortest_time
 from densarm.values.checks import one_of
 from densarm.values.outcome import FAILED, RUN_ENDS, Outcome
+from densarm.values.progress import OnProgress
 from densarm.values.tables import parse_table
 
 PERCENTILES = (50, 95, 98)
@@ -162,7 +163,7 @@ class ProblemResults:
 def run_problems(
     problems: Sequence[MotionProblem],
     jobs: int = 1,
-    on_progress: Callable[[str], None] = lambda _: None,
+    on_progress: OnProgress = lambda _: None,
     scheduler: str | None = None,
     **options: Any,
 ) -> ProblemResults:

@@ -21,6 +21,7 @@ from densarm.study.cluster import in_order
 from densarm.study.problems import named_arm
 from densarm.values.arrays import Array
 from densarm.values.checks import non_negative_integer, one_of, positive_integer
+from densarm.values.progress import OnProgress
 from densarm.world.separating_planes import SeparatingPlanes
 from densarm.world.world import World
 
@@ -45,7 +46,7 @@ def random_problems(
     seed: int,
     scenes: str = "mixed",
     jobs: int = 1,
-    on_progress: Callable[[str], None] = lambda _: None,
+    on_progress: OnProgress = lambda _: None,
     scheduler: str | None = None,
 ) -> list[MotionProblem]:
     """Draw problems of an arm among random obstacles, of which each has a solution.

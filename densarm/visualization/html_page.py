@@ -17,10 +17,11 @@ import umsgpack
 
 from densarm.simulation.run import Run
 from densarm.values.files import atomic_file
+from densarm.values.progress import is_in_notebook
 from densarm.visualization import palette
 from densarm.visualization.bodies import spoken_names
 from densarm.visualization.meshcat_drawing import draw
-from densarm.visualization.notebook import is_in_notebook, show_page
+from densarm.visualization.notebook import show_page
 from densarm.visualization.palette import css
 from densarm.visualization.render_scene import RenderScene, SummaryLine
 

@@ -33,13 +33,6 @@ def run_in_notebook(run: Run) -> str:
     )
 
 
-def is_in_notebook() -> bool:
-    """Return whether a kernel runs this, which shows what a cell displays."""
-    if (ipython := sys.modules.get("IPython")) is None:
-        return False
-    return getattr(ipython.get_ipython(), "kernel", None) is not None
-
-
 def show_page(page: str) -> None:
     """Show a page of HTML below the cell that runs."""
     display: Any = sys.modules["IPython"].display

@@ -71,7 +71,7 @@ def test_numbers_are_the_same_whoever_runs_them(study: Study, tmp_path: Path) ->
 def test_file_is_gone_on_with_by_more_starts_and_no_others(
     swing_up: Scenario, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def fail(case: Scenario) -> None:
+    def fail(case: Scenario, **_: object) -> None:
         raise ArithmeticError(f"{case.name} fails")
 
     monkeypatch.setattr("densarm.study.monte_carlo.run", fail)

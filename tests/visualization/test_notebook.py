@@ -7,7 +7,7 @@ import pytest
 import densarm
 from densarm.simulation.run import Run
 from densarm.visualization import html_page
-from densarm.visualization.notebook import is_in_notebook, run_in_notebook
+from densarm.visualization.notebook import run_in_notebook
 
 
 def test_run_shows_picture_outcome_clearance_and_certificate(swing: Run) -> None:
@@ -23,14 +23,6 @@ def test_run_shows_picture_outcome_clearance_and_certificate(swing: Run) -> None
 def test_title_is_escaped(swing: Run) -> None:
     assert "<b> &" in swing.task.title
     assert "<b> &" not in run_in_notebook(swing)
-
-
-def test_no_kernel_no_notebook(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(sys.modules, "IPython", None)
-    assert not is_in_notebook()
-    terminal = SimpleNamespace(get_ipython=SimpleNamespace)
-    monkeypatch.setitem(sys.modules, "IPython", terminal)
-    assert not is_in_notebook()
 
 
 def test_view_shows_the_page_below_the_cell(monkeypatch: pytest.MonkeyPatch, swing: Run) -> None:
