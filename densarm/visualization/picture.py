@@ -287,7 +287,7 @@ class Caption:
         pen.text(at, words, ink, self._text_font, anchor=anchor)
 
     def _font(self, name: str, size: float) -> ImageFont.FreeTypeFont:
-        return ImageFont.truetype(str(_font_folder() / name), self._at(size))
+        return ImageFont.truetype(str(_font_folder() / name), max(1, self._at(size)))
 
     def _at(self, length: float) -> int:
         """Return a length of a picture 1280 pixels wide in pixels of this one."""

@@ -40,6 +40,10 @@ def test_frames_show_the_motion_and_the_obstacles(
     assert differing(Picture(alone, *SIZE).frame(0), first) > 500
 
 
+def test_a_picture_too_small_for_its_words_is_made(swing: Run) -> None:
+    assert Picture(RenderScene(swing), 16, 12).frame(0).size == (16, 12)
+
+
 def test_arm_covers_its_goal_at_the_end(swing: Run, monkeypatch: pytest.MonkeyPatch) -> None:
     scene = RenderScene(swing)
     last = len(scene.time) - 1
