@@ -6,8 +6,8 @@
 ENV is an environment of its own: see franka_sim_server.py. Motions lead from where the robot is to
 random configurations that are clear, one after the other, in a scene of a table, posts, a lamp and
 the floor. Judged are the robot's own state after each, and what it says of errors and of lost
-commands; the rate is that of commands by the wall clock. With --waits the rate says nothing: the
-simulator waits for the answers of a machine that is not quiet.
+commands; the rate is that of commands by the wall clock. With --waits the simulator waits for the
+answers of a machine that is not quiet.
 """
 
 import argparse
@@ -105,7 +105,6 @@ def measure(address: str, count: int) -> list[dict[str, object]]:
             "goal_error_rad": error,
             "tracking_error_rad": run.tracking_error,
             "min_clearance_m": float(run.clearance.min()),
-            "errors": str(state.last_motion_errors),
             "success_rate": state.control_command_success_rate,
             "lost": run.remark,
             "rate_hz": (len(robot.times) - 1) / (robot.times[-1] - robot.times[0]),
@@ -118,18 +117,24 @@ def measure(address: str, count: int) -> list[dict[str, object]]:
             f"{1e3 * (run.tracking_error or 0.0):5.2f} mrad, {row['rate_hz']:4.0f} Hz, "
             f"{row['work_us']:4.0f} us, unproved {row['unproved']} {run.detail} {run.remark}"
         )
-        settle(robot)
+        if not settles(robot):
+            print(f"the robot still moves {SETTLES} s after its motion: no more are made")
+            break
     return measured
 
 
-def settle(robot: Timed) -> None:
-    """Wait until the robot rests, and clear what it stopped for."""
+def settles(robot: Timed) -> bool:
+    """Wait until the robot rests, and clear what it stopped for; return whether it rests.
+
+    After a reflex franka-sim's own hold may let the last joint tremble by 0.08 rad/s for good.
+    """
     until = time.monotonic() + SETTLES
     while np.abs(robot.read().velocity).max() > RESTS:
         if time.monotonic() > until:
-            raise RobotError(f"the robot still moves {SETTLES} s after its motion")
+            return False
     if robot.state.current_errors or robot.state.robot_mode.name == "Reflex":
         robot.recover()
+    return True
 
 
 def scene() -> densarm.World:
@@ -171,7 +176,7 @@ def report(measured: list[dict[str, object]], *, waits: bool) -> None:
 
     reached = sum(row["outcome"] == "reached" for row in measured)
     near = int((of("goal_error_rad") <= REACHED).sum())
-    reflexes = sum(row["errors"] != "[]" for row in measured)
+    reflexes = sum("reflex" in str(row["detail"]) for row in measured)
     print(f"reached {reached} of {len(measured)}, within {1e3 * REACHED:g} mrad {near}")
     print(f"largest error {1e3 * of('goal_error_rad').max():.2f} mrad, reflexes {reflexes}")
     print(f"certified {sum(bool(row['certified']) for row in measured)}")
