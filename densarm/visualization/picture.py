@@ -282,16 +282,16 @@ class Caption:
         anchor = "lm" if side > 0 else "rm"
         box = pen.textbbox(at, words, self._text_font, anchor=anchor)
         around = (box[0] - inset, box[1] - inset, box[2] + inset, box[3] + inset)
-        pen.line((*end, *at), ink, max(1, self._at(1.3)))
+        pen.line((*end, *at), ink, self._at(1.3))
         pen.rounded_rectangle(around, inset, "white")
         pen.text(at, words, ink, self._text_font, anchor=anchor)
 
     def _font(self, name: str, size: float) -> ImageFont.FreeTypeFont:
-        return ImageFont.truetype(str(_font_folder() / name), max(1, self._at(size)))
+        return ImageFont.truetype(str(_font_folder() / name), self._at(size))
 
     def _at(self, length: float) -> int:
-        """Return a length of a picture 1280 pixels wide in pixels of this one."""
-        return round(length * self._unit)
+        """Return a length of a picture 1280 pixels wide in pixels of this one, one at least."""
+        return max(1, round(length * self._unit))
 
 
 def _font_folder() -> Path:
