@@ -22,12 +22,15 @@ class FrankaRobot:
 
     The robot adds gravity's torque. What is sent is
 
-    .. math:: \tau_J = \tau_J^d + s\,(\tau - g(q) - \tau_J^d)
+    .. math:: \tau_J = c + s\,(\tau - g(q) - c), \qquad c = (\tau_J^d + \tau_J^-) / 2
 
     with the largest s ≤ 1 by which no joint's torque changes by more than its rate allows in a
-    millisecond, τ_J^d being what the robot acts by. Where torque changes faster the robot stops, by
-    its reflex `controller_torque_discontinuity`. densarm's laws keep to the rate themselves, so
-    that s = 1 unless a packet was lost. τ_J keeps the torque limits too, as the robot wants it.
+    millisecond, neither from τ_J^d, by which the robot acted when it told its state, nor from
+    τ_J^-, which was sent last: a late command reaches the robot after a state that does not tell it
+    yet. Where they are too far apart for both, the robot lost commands, and c = τ_J^d. Where torque
+    changes faster the robot stops, by its reflex `controller_torque_discontinuity`. densarm's laws
+    keep to the rate themselves, so that s = 1 unless a packet was late or lost. τ_J keeps the
+    torque limits too, as the robot wants it.
 
     Args:
         address: the robot's, or a simulator's.
@@ -59,6 +62,7 @@ class FrankaRobot:
         self._step = _RATE_SHARE * self.period * rate
         self._failures = (RuntimeError, franka.FrankaException)
         self._control: Any = None
+        self._sent = np.zeros(_JOINTS)  # [N·m], while it is controlled
         config = franka.RealtimeConfig
         try:
             self._robot = franka.Robot(
@@ -114,14 +118,18 @@ class FrankaRobot:
         state = self.state
         free = u - pin.computeGeneralizedGravity(self._model, self._data, np.array(state.q))
         acting = np.array(state.tau_J_d)
-        change = free - acting
-        change /= max(1.0, float((np.abs(change) / self._step).max()))
-        free = np.clip(acting + change, -self._effort, self._effort)
+        middle = 0.5 * (acting + (acting if self._control is None else self._sent))
+        room = self._step - np.abs(acting - middle)
+        if room.min() <= 0.0:
+            middle, room = acting, self._step
+        change = free - middle
+        change /= max(1.0, float((np.abs(change) / room).max()))
+        self._sent = np.clip(middle + change, -self._effort, self._effort)
         try:
             if self._control is None:
                 self._control = self._robot.start_torque_control()
                 self.state, _ = self._control.readOnce()
-            self._control.writeOnce(self._franka.Torques(free.tolist()))
+            self._control.writeOnce(self._franka.Torques(self._sent.tolist()))
         except self._failures as error:
             self._control = None
             raise in_its_words(self._address, "stopped", error) from None

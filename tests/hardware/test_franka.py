@@ -130,6 +130,25 @@ def test_torque_changes_from_what_the_robot_acts_by_as_fast_as_it_bears(stands: 
     np.testing.assert_allclose(stand.sent[-1].tau_J, -wanted + wanted * 0.999 / 4.0)
 
 
+def test_torque_changes_no_faster_from_what_was_sent_last_where_the_state_is_older(
+    stands: Stands,
+) -> None:
+    stand = stands()
+    robot = FrankaRobot("fake", ARM)
+    wanted = np.array([4.0, -2.0, 1.0, 0.5, 0.0, -0.1, 0.2])
+    robot.command(GRAVITY + wanted)
+    before = np.zeros(7)
+    for _ in range(3):  # each state was sent before the last command arrived
+        stand.acting, last = before, np.array(stand.sent[-1].tau_J)
+        robot.read()
+        robot.command(GRAVITY - wanted)
+        now = np.array(stand.sent[-1].tau_J)
+        assert np.abs(now - last).max() <= 1.0
+        assert np.abs(now - before).max() <= 1.0
+        before = last
+    assert now[0] < -0.5
+
+
 def test_what_is_sent_keeps_the_torque_limits_without_gravity_too(stands: Stands) -> None:
     limit = ARM.limits.effort
     stand = stands(acting=limit - 0.1)
