@@ -9,14 +9,12 @@ arm and look into it; the arm itself is not there. Of each cube of 15 mm one poi
 import sys
 
 import numpy as np
-import pinocchio as pin
 
 from densarm.arms.catalogue import scenario_paths
 from densarm.scenarios.scenario import load_scenario
-from densarm.scene.depth_camera import depth_image, depth_points
+from densarm.scene.depth_camera import seen_points
 from densarm.scene.obstacles import Box, Cylinder, Sphere
 from densarm.scene.point_cloud import checked_points, voxel_filter
-from densarm.values.arrays import Array
 
 OBJECTS = (
     Cylinder(name="can", radius=0.04, length=0.14, position=(0.72, -0.26, 0.34)),
@@ -30,23 +28,9 @@ TARGET = np.array([0.75, 0.0, 0.6])  # [m]
 VOXEL = 0.015  # [m]
 
 
-def facing(position: Array) -> pin.SE3:
-    """Return the pose of a camera that looks at the target, upright."""
-    z = (TARGET - position) / np.linalg.norm(TARGET - position)
-    x = np.cross(z, [0.0, 0.0, 1.0])
-    x /= np.linalg.norm(x)
-    return pin.SE3(np.column_stack([x, np.cross(z, x), z]), position)
-
-
 def main() -> int:
     scene = [*load_scenario("panda_shelf").scene, *OBJECTS]
-    seen = []
-    for place in CAMERAS:
-        pose = facing(np.array(place))
-        quaternion = pin.SE3ToXYZQUAT(pose)[3:]
-        depth = depth_image(scene, INTRINSICS, SHAPE, place, quaternion)
-        points = depth_points(depth, INTRINSICS)
-        seen.append(points[np.isfinite(points).all(axis=1)] @ pose.rotation.T + pose.translation)
+    seen = [seen_points(scene, INTRINSICS, SHAPE, place, TARGET) for place in CAMERAS]
     points, _ = checked_points("points", np.vstack(seen))
     points = voxel_filter(points, VOXEL).astype(np.float32)
     path = scenario_paths()["panda_shelf"].with_name("panda_shelf_cloud.npy")

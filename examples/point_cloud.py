@@ -2,17 +2,16 @@
 
     python examples/point_cloud.py
 
-There are no cameras: `depth_image` makes the pictures that they would have. Expected output:
+There are no cameras: `seen_points` makes what they would see. Expected output:
 
     13609 points, 60 pairs of bodies
     reached, certified: True, smallest distance 16 mm
 """
 
 import numpy as np
-import pinocchio as pin
 
 import densarm
-from densarm.scene.depth_camera import depth_image, depth_points
+from densarm.scene.depth_camera import seen_points
 from densarm.scene.point_cloud import voxel_filter
 from densarm.world.cloud_filter import CloudFilter
 
@@ -21,25 +20,12 @@ CAMERAS = [(-0.35, 0.7, 1.0), (-0.35, -0.7, 1.0), (-0.2, 0.0, 0.35)]  # m
 TARGET = np.array([0.75, 0.0, 0.6])  # m
 
 
-def facing(position: np.ndarray) -> pin.SE3:
-    z = (TARGET - position) / np.linalg.norm(TARGET - position)
-    x = np.cross(z, [0.0, 0.0, 1.0])
-    x /= np.linalg.norm(x)
-    return pin.SE3(np.column_stack([x, np.cross(z, x), z]), position)
-
-
 def main() -> None:
     scenario = densarm.load_scenario("panda_shelf")
     arm, start = scenario.arm, scenario.start
-    own = CloudFilter(arm)
-    seen = []
-    for position in CAMERAS:
-        camera = facing(np.array(position))
-        quaternion = pin.SE3ToXYZQUAT(camera)[3:]
-        depth = depth_image(scenario.scene, INTRINSICS, (240, 320), position, quaternion)
-        points = own.kept(start, depth_points(depth, INTRINSICS), camera)
-        seen.append(points @ camera.rotation.T + camera.translation)
-    points = voxel_filter(np.vstack(seen), 0.015)
+    seen = [seen_points(scenario.scene, INTRINSICS, (240, 320), x, TARGET) for x in CAMERAS]
+    points = CloudFilter(arm).kept(start, np.vstack(seen))
+    points = voxel_filter(points, 0.015)
     cloud = densarm.PointCloud(name="shelf", points=points, radius=0.015)
     world = densarm.World(arm, densarm.Scene([cloud]))
     print(f"{len(points)} points, {world.n_pairs} pairs of bodies")

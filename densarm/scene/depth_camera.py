@@ -76,18 +76,56 @@ def depth_image(
     for obstacle in (item for item in scene if not isinstance(item, PointCloud)):
         seen = pose.inverse() * obstacle_pose(obstacle)
         for convex in obstacle.convex_shapes():
-            enters, leaves = np.zeros(len(rays)), np.full(len(rays), np.inf)
-            for normal, height in _planes(convex):
+            faces, middle, radius = _faces(convex)
+            x = seen.act(middle)
+            off = np.linalg.norm(np.cross(rays, x), axis=1)  # of the ray from the middle
+            near = np.flatnonzero(off <= radius * np.linalg.norm(rays, axis=1))
+            some, enters, leaves = rays[near], np.zeros(len(near)), np.full(len(near), np.inf)
+            for normal, height in faces:
                 turned = seen.rotation @ normal
-                rate, above = rays @ turned, height + float(turned @ seen.translation)
+                rate, above = some @ turned, height + float(turned @ seen.translation)
                 with np.errstate(divide="ignore", invalid="ignore"):
                     at = above / rate
                 enters = np.where(rate < 0.0, np.maximum(enters, at), enters)
                 leaves = np.where(rate > 0.0, np.minimum(leaves, at), leaves)
                 leaves = np.where((rate == 0.0) & (above < 0.0), -1.0, leaves)
             hit = (enters < leaves) & (enters > 0.0)
-            depth = np.where(hit, np.minimum(depth, enters), depth)
+            depth[near] = np.where(hit, np.minimum(depth[near], enters), depth[near])
     return np.where(np.isfinite(depth), depth, 0.0).reshape(rows, columns)
+
+
+def seen_points(
+    scene: Iterable[Obstacle],
+    intrinsics: ArrayLike,
+    shape: tuple[int, int],
+    position: ArrayLike,
+    target: ArrayLike,
+) -> Array:
+    """Return the points that an upright camera would see of obstacles, in the world (N, 3) [m].
+
+    Args:
+        scene: the obstacles, as for `depth_image`.
+        intrinsics: as of `depth_points`.
+        shape: numbers of rows and columns.
+        position: of the camera (3,) [m].
+        target: what it looks at (3,) [m].
+
+    Raises:
+        InvalidValueError: as `depth_image`, or the camera looks at itself.
+    """
+    place, into = finite_vector("position", position, 3), finite_vector("target", target, 3)
+    if not (far := float(np.linalg.norm(into - place))) > 0.0:
+        raise InvalidValueError("target", target, "another place than the camera's")
+    z = (into - place) / far
+    right = np.cross(z, [0.0, 0.0, 1.0])
+    if not right.any():
+        right = np.array([0.0, -1.0, 0.0])
+    x = right / np.linalg.norm(right)
+    camera = pin.SE3(np.column_stack([x, np.cross(z, x), z]), place)
+    depth = depth_image(scene, intrinsics, shape, place, pin.SE3ToXYZQUAT(camera)[3:])
+    points = depth_points(depth, intrinsics)
+    points = points[np.isfinite(points).all(axis=1)]
+    return np.asarray(points @ camera.rotation.T + place)
 
 
 def _rays(intrinsics: ArrayLike, shape: tuple[int, ...]) -> Array:
@@ -100,17 +138,19 @@ def _rays(intrinsics: ArrayLike, shape: tuple[int, ...]) -> Array:
     return np.stack([(u - k[0, 2]) / k[0, 0], (v - k[1, 2]) / k[1, 1], np.ones(shape)], axis=-1)
 
 
-def _planes(shape: coal.CollisionGeometry) -> list[tuple[Array, float]]:
-    """Return normals out of a convex shape, and n · x on its faces."""
+def _faces(shape: coal.CollisionGeometry) -> tuple[list[tuple[Array, float]], Array, float]:
+    """Return normals out of a convex shape and n · x on its faces, and a ball around it."""
     from scipy.spatial import ConvexHull
 
     if isinstance(shape, coal.Halfspace):
-        return [(np.array(shape.n), float(shape.d))]
+        return [(np.array(shape.n), float(shape.d))], np.zeros(3), np.inf
     points, radius = extreme_points(shape)
+    middle = 0.5 * (points.min(axis=0) + points.max(axis=0))
+    around = radius + float(np.linalg.norm(points - middle, axis=1).max())
     if radius > 0.0:
         points = (points[:, np.newaxis] + radius * _ball()).reshape(-1, 3)
     equations = np.unique(ConvexHull(points).equations, axis=0)
-    return [(row[:3], -float(row[3])) for row in equations]
+    return [(row[:3], -float(row[3])) for row in equations], middle, around
 
 
 def _ball() -> Array:

@@ -14,18 +14,20 @@ from densarm.world.cloud_search import (
     see,
     write_middle,
 )
-from densarm.world.hulls import farthest_corner, point_gap
+from densarm.world.hulls import Search, farthest_corner, point_gap
 from densarm.world.simplex import Integers
 
 _ACCURACY = 1e-5  # [m], by which the bound on a distance may fall short of it
-_MANY, _LONG = 100, 0.1  # nodes looked at on an arc of more than so many [m], which is halved then
+_SMALL = 0.25  # of how far a link moves on half an arc; into smaller nodes it is not looked there
 _GAPS = 4  # first column of the gaps that suffice
-_FOUND = 6  # first column of what is known of a plane on any arc
+_FOUND, _CORNER = 6, 10  # first columns of what is known of a plane on any arc
+_UNKNOWN = -1.0  # a gap that nobody asked for yet
 
-PLANES = (6, 10)
+PLANES = (6, 11)
 """Planes that are kept of a link and a cloud, those that prove most before the others, and what of
 each: in the cloud's frame unit normal out of the link, n · x on it, and the gaps before it that
-suffice on either half of an arc; unit normal and n · x in the link's frame, infinite for none."""
+suffice on either half of an arc; in the link's frame unit normal, n · x, infinite for none, and the
+corner that lies on it."""
 
 
 @compiled_lean_part
@@ -35,8 +37,9 @@ def unproved_halves(  # noqa: C901  # what is called at each level is compiled o
     """Return which halves of an arc a link is not proved apart from a cloud on, as bits 1 and 2.
 
     A node of the cloud's tree is proved by a plane before its box in the middle of the arc: by its
-    gap there alone, or by those at both ends too. Planes that have proved others are tried first.
-    What is not proved is looked into, down to each point.
+    gap there alone, or by those at both ends too, on halves of which all before was proved. Planes
+    that have proved others are tried first. What is not proved is looked into, down to each point,
+    unless it is small beside the way that the link goes: then the halves are shorter first.
 
     Args:
         bodies: the bodies.
@@ -44,7 +47,7 @@ def unproved_halves(  # noqa: C901  # what is called at each level is compiled o
         arc: what is to be proved.
         corners: of the pair (4, 2): a corner of the link in the first row; the point of the cloud
             that is not apart is written to the second.
-        planes: of the pair (6, 10), see `PLANES`, overwritten.
+        planes: of the pair (6, 11), see `PLANES`, overwritten.
         space: to work in.
 
     Returns:
@@ -54,30 +57,29 @@ def unproved_halves(  # noqa: C901  # what is called at each level is compiled o
     points = bodies.clouds.points[bodies.clouds.first[c, 0] : bodies.clouds.first[c + 1, 0]]
     boxes = bodies.clouds.boxes[bodies.clouds.first[c, 1] : bodies.clouds.first[c + 1, 1]]
     search, seen, ends, box, places, waiting, bounds = space
-    x, middle = places[0], places[1]
+    x, middle, last = places[0], places[1], planes[planes.shape[0] - 1]
     _write_seen(poses[1, arc.link], poses[1, arc.cloud], seen)
     for bit in range(2):
         _write_seen(poses[2 * bit, arc.link], poses[1, arc.link], ends[bit])
     for axis in range(3):
         box[3 + axis] = bodies.shapes[arc.link, BOX + axis] - bodies.shapes[arc.link, RADIUS]
         box[axis] = -box[3 + axis]
-    count, waiting[0], looked_at = 1, 0, 0
+    count, waiting[0] = 1, 0
     bounds[0] = box_bound(boxes[0], seen, box)
     if bounds[0] - held > arc.half:
         return 0
     for k in range(planes.shape[0]):
         planes[k, 3] = math.inf
         if planes[k, _FOUND + 3] < math.inf:
-            _write_gaps(bodies, space, arc, corner, planes[k])
+            _place_plane(planes[k], seen)
     while count > 0:
         count -= 1
         node, far = waiting[count], bounds[count]
-        # No plane is looked for where the box may be inside of the link's.
-        if far - held > arc.half or (far > 0.0 and _proves(boxes[node], held, planes)):
+        if far - held > arc.half:
             continue
-        looked_at += 1
-        if looked_at > _MANY and arc.half > _LONG:
-            return 3
+        # No plane is looked for where the box may be inside of the link's.
+        if far > 0.0 and _proves(bodies, space, arc, planes, boxes[node], unproved):
+            continue
         begin, end = leaf_points(PointTree(points, boxes), node)
         if far > 0.0 or begin < end:
             size = write_middle(boxes[node], middle)
@@ -86,15 +88,22 @@ def unproved_halves(  # noqa: C901  # what is called at each level is compiled o
             gap, _ = point_gap(bodies.points, bodies.edges, corner, x, enough, accuracy, search)
             corner = search.corners[0, 0]
             if gap > 0.0 and plane_bound(boxes[node], seen, search.plane) > held:
-                _write_plane(bodies, space, arc, corner, planes)
-                if _proves(boxes[node], held, planes[planes.shape[0] - 1 :]):
+                _write_plane(search, corner, seen, last)
+                beyond = _beyond(boxes[node], last) - held
+                left = _unproved(bodies, space, arc, last, beyond, unproved)
+                if left == unproved:
+                    continue
+                if size < _SMALL * arc.half:
+                    unproved = left
+                    if unproved == 3:
+                        return unproved
                     continue
         if begin == end:
             one, other = 2 * node + 2, 2 * node + 1
             near, far = box_bound(boxes[one], seen, box), box_bound(boxes[other], seen, box)
             count = put_nearer_last(one, near, other, far, waiting, bounds, count)
         for k in range(begin, end):
-            if _is_beyond(points[k], held, planes):
+            if _proves(bodies, space, arc, planes, points[k], unproved):
                 continue
             see(seen, points[k], x)
             enough = held + arc.half
@@ -103,10 +112,8 @@ def unproved_halves(  # noqa: C901  # what is called at each level is compiled o
             if not gap > held:
                 corners[1, 0] = k
                 return -1
-            _write_plane(bodies, space, arc, corner, planes)
-            for bit in range(2):
-                if not gap - held > planes[planes.shape[0] - 1, _GAPS + bit]:
-                    unproved |= 1 << bit
+            _write_plane(search, corner, seen, last)
+            unproved = _unproved(bodies, space, arc, last, gap - held, unproved)
             if unproved == 3:
                 return unproved
     return unproved
@@ -149,14 +156,16 @@ def _write_seen(frame: Array, pose: Array, seen: Array) -> None:
 
 
 @compiled_lean_part
-def _proves(node: Array, held: float, planes: Array) -> bool:
-    """Return whether a plane proves all of a node's box on the whole arc; it is moved forward."""
+def _proves(
+    bodies: Bodies, space: CloudSpace, arc: Arc, planes: Array, node: Array, unproved: int
+) -> bool:
+    """Return whether a plane proves a node's box (6,), or a point (3,), on all but such halves.
+
+    It is put forward. Other arguments as for `unproved_halves`.
+    """
     for k in range(planes.shape[0]):
-        beyond = -planes[k, 3] - held
-        for axis in range(3):
-            along = planes[k, axis]
-            beyond += along * (node[axis] if along > 0.0 else node[3 + axis])
-        if beyond > max(planes[k, _GAPS], planes[k, _GAPS + 1]):
+        gap = _beyond(node, planes[k]) - arc.held
+        if gap > 0.0 and _unproved(bodies, space, arc, planes[k], gap, unproved) == unproved:
             if k > 0:
                 for n in range(planes.shape[1]):
                     before = planes[k - 1, n]
@@ -167,29 +176,55 @@ def _proves(node: Array, held: float, planes: Array) -> bool:
 
 
 @compiled_lean_part
-def _is_beyond(x: Array, held: float, planes: Array) -> bool:
-    """Return whether a plane proves a point (3,) of the cloud's frame on the whole arc."""
-    for k in range(planes.shape[0]):
-        gap = planes[k, 0] * x[0] + planes[k, 1] * x[1] + planes[k, 2] * x[2] - planes[k, 3]
-        if gap - held > max(planes[k, _GAPS], planes[k, _GAPS + 1]):
-            return True
-    return False
+def _beyond(node: Array, plane: Array) -> float:
+    """Return how far beyond a plane in the middle of an arc a node's box (6,), or a point, is."""
+    beyond, high = -plane[3], node.size - 3
+    for axis in range(3):
+        along = plane[axis]
+        beyond += along * (node[axis] if along > 0.0 else node[high + axis])
+    return float(beyond)
 
 
 @compiled_lean_part
-def _write_plane(bodies: Bodies, space: CloudSpace, arc: Arc, corner: int, planes: Array) -> None:
-    """Write the plane of the search as the last one. Arguments as for `_write_gaps`."""
-    plane = planes[planes.shape[0] - 1]
+def _unproved(
+    bodies: Bodies, space: CloudSpace, arc: Arc, plane: Array, gap: float, unproved: int
+) -> int:
+    """Return unproved halves and those that a plane with a gap in the middle does not prove."""
+    for bit in range(2):
+        if unproved >> bit & 1 or gap > arc.half:
+            continue
+        if plane[_GAPS + bit] == _UNKNOWN:
+            plane[_GAPS + bit] = _sufficient_gap(bodies, space.ends[bit], arc.bend, plane)
+        if not gap > plane[_GAPS + bit]:
+            unproved |= 1 << bit
+    return unproved
+
+
+@compiled_lean_part
+def _write_plane(search: Search, corner: int, seen: Array, plane: Array) -> None:
+    """Write the plane of the search, on which a corner lies."""
     for k in range(4):
-        plane[_FOUND + k] = space.search.plane[k]
-    _write_gaps(bodies, space, arc, corner, plane)
+        plane[_FOUND + k] = search.plane[k]
+    plane[_CORNER] = corner
+    _place_plane(plane, seen)
 
 
 @compiled_lean_part
-def _write_gaps(bodies: Bodies, space: CloudSpace, arc: Arc, corner: int, plane: Array) -> None:
-    r"""Write a plane in the cloud's frame, and the gaps that prove each half of an arc.
+def _place_plane(plane: Array, seen: Array) -> None:
+    """Write a plane in the cloud's frame, which has a pose in the link's in the middle (12,)."""
+    plane[3], plane[_GAPS], plane[_GAPS + 1] = plane[_FOUND + 3], _UNKNOWN, _UNKNOWN
+    for c in range(3):
+        plane[c] = 0.0
+        plane[3] -= plane[_FOUND + c] * seen[9 + c]
+        for r in range(3):
+            plane[c] += seen[3 * r + c] * plane[_FOUND + r]
 
-    With the gaps f in the middle and f + δ at an end, the half is proved if
+
+@compiled_lean_part
+def _sufficient_gap(bodies: Bodies, end: Array, bend: float, plane: Array) -> float:
+    r"""Return the gap before a plane in the middle of an arc that proves a half of it [m].
+
+    With the gaps f in the middle and f + δ at the end, the half is proved if
 
     .. math:: \beta < 8 (\sqrt{f} + \sqrt{f + \delta})^2,
 
@@ -197,30 +232,20 @@ def _write_gaps(bodies: Bodies, space: CloudSpace, arc: Arc, corner: int, plane:
 
     Args:
         bodies: the bodies.
-        space: what is known of the arc.
-        arc: what is to be proved.
-        corner: a corner of the link, near to the plane.
-        plane: as it is in the link's frame (10,); the rest is written.
+        end: pose of the link's frame in the middle, in that at the end (12,).
+        bend: β of the whole arc [m].
+        plane: the plane (11,).
     """
-    found, along = plane[_FOUND:], space.places[2]
-    square, plane[3] = 0.125 * arc.bend, found[3]
-    for c in range(3):
-        plane[c] = 0.0
-        plane[3] -= found[c] * space.seen[9 + c]
-        for r in range(3):
-            plane[c] += space.seen[3 * r + c] * found[r]
-    for bit in range(2):
-        pose, more = space.ends[bit], found[3]
-        for r in range(3):
-            along[r] = 0.0
-            for c in range(3):
-                along[r] += pose[3 * r + c] * found[c]
-            more += along[r] * pose[9 + r]
-        _, farthest = farthest_corner(
-            bodies.points, bodies.edges, corner, along[0], along[1], along[2]
-        )
-        more -= farthest
-        enough = max(0.0, -more)
-        if abs(more) < square:
-            enough = (square - more) ** 2 / (4.0 * square)
-        plane[_GAPS + bit] = min(enough, arc.half)
+    square, more, a, b, c = 0.125 * bend, plane[_FOUND + 3], 0.0, 0.0, 0.0
+    for k in range(3):
+        along = plane[_FOUND + k]
+        a += end[k] * along
+        b += end[3 + k] * along
+        c += end[6 + k] * along
+    more += a * end[9] + b * end[10] + c * end[11]
+    corner = int(plane[_CORNER])
+    _, farthest = farthest_corner(bodies.points, bodies.edges, corner, a, b, c)
+    more -= farthest
+    if abs(more) < square:
+        return (square - more) ** 2 / (4.0 * square)
+    return max(0.0, -more)

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from densarm.errors import FileContentError, InvalidValueError
 from densarm.scene.cloud_file import read_points
-from densarm.scene.depth_camera import depth_image, depth_points
+from densarm.scene.depth_camera import depth_image, depth_points, seen_points
 from densarm.scene.obstacles import Box, Capsule, HalfSpace, Sphere
 from densarm.scene.point_cloud import PointCloud, voxel_filter
 from densarm.scene.scene import Attachment, Scene, parse_obstacle
@@ -140,6 +140,18 @@ def test_a_depth_image_of_bodies_becomes_points_on_them() -> None:
     assert off.max() < 5e-3  # of the polyhedra that balls are
     for near in (off_ball, off_box, off_rod):
         assert np.count_nonzero(near < 5e-3) > 20
+
+
+@pytest.mark.parametrize("position", [(1.0, 0.4, 0.3), (0.0, 0.0, 2.0), (-0.2, -1.0, -0.5)])
+def test_a_camera_sees_what_it_looks_at_from_its_own_side(position: tuple[float, ...]) -> None:
+    place, target = np.array(position), np.array([0.0, 0.05, 0.1])
+    ball = Sphere(name="ball", radius=0.15, position=target)
+    points = seen_points([ball], INTRINSICS, (48, 64), place, target)
+    assert len(points) > 20
+    assert np.abs(np.linalg.norm(points - target, axis=1) - 0.15).max() < 5e-3
+    assert ((points - target) @ (place - target) > 0.0).all()
+    with pytest.raises(InvalidValueError, match="target"):
+        seen_points([ball], INTRINSICS, (48, 64), place, place)
 
 
 def test_pixels_without_depth_are_no_points() -> None:
