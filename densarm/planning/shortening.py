@@ -13,6 +13,7 @@ from densarm.values.kernels import compiled, compiled_part
 
 _SPACINGS = 0.5, 0.25, 0.125  # [rad or m] at most between points that tries begin at, in turn
 _HALF_TURN = math.pi - 1e-9  # [rad], beyond which rounding decides which way round a proof goes
+_STRAIGHT = 1e-9  # [rad or m], off a straight line at most
 _IN_VAIN = 150  # tries that gain nothing, after which no more are made
 _LEAST_GAIN = 3e-4  # of a path's length; a try that gains less is not worth a check
 
@@ -64,6 +65,8 @@ def _straightened(
             in_vain = 0
     kept = [points[0]]
     for waypoint, after in pairwise(points[1:]):
+        if _is_between(arm.difference(kept[-1], np.stack([waypoint, after]))):
+            continue  # what leads there is clear
         if not freedom.segment_is_clear(kept[-1], after):
             kept.append(waypoint)
     return np.stack([*kept, points[-1]])
@@ -78,6 +81,13 @@ def _resampled(arm: Arm, path: Array, spacing: float) -> Array:
         for q, step, n in zip(path, steps, parts, strict=False)
     ]
     return np.vstack([*pieces, path[-1:]])
+
+
+def _is_between(steps: Array) -> bool:
+    """Return whether the first of two steps (2, nv) is a part of the second."""
+    part, whole = steps
+    share = float(part @ whole) / max(float(whole @ whole), _STRAIGHT**2)
+    return 0.0 <= share <= 1.0 and bool(np.abs(part - share * whole).max() < _STRAIGHT)
 
 
 def _length(steps: Array) -> Array:
