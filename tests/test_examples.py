@@ -314,3 +314,13 @@ def test_way_points(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixtu
     assert reached.endswith("certified: True")
     assert float(passes.split()[-2]) > 0.5
     assert proved.startswith("2 passed in their order, each joint within 0.0")
+
+
+@pytest.mark.slow
+def test_seen_things(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    run_example(monkeypatch, "seen_things.py", "--out", str(tmp_path))
+    out = capsys.readouterr().out
+    assert re.match(r"reached, certified: True, clearance [5-9] mm\n$", out)
+    assert (tmp_path / "seen_things.png").stat().st_size > 10_000

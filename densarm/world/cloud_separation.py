@@ -247,5 +247,5 @@ def _sufficient_gap(bodies: Bodies, end: Array, bend: float, plane: Array) -> fl
     _, farthest = farthest_corner(bodies.points, bodies.edges, corner, a, b, c)
     more -= farthest
     if abs(more) < square:
-        return (square - more) ** 2 / (4.0 * square)
-    return max(0.0, -more)
+        return float((square - more) ** 2 / (4.0 * square))
+    return float(max(0.0, -more))
